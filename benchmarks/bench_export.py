@@ -18,13 +18,13 @@ import numpy as np
 
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
-from thermocomp.runtime.program.tables import gather
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.vectors import Readings, replay
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.tables import gather
 from thermocomp.virtual.datasets import record
 
 GOAL_US, CALLS = 1.0, 4000

@@ -198,7 +198,7 @@ def test_how_a_recording_begins(recording: Recording) -> None:
 
 def test_report_of_a_handed_in_estimator(recording: Recording, tmp_path: Path) -> None:
     found = tc.compare(recording, "z_um", [tc.Ridge(strengths=(0.1,)), "gp"], split="0.5/0.5", robustness=True)
-    assert "an estimator that was handed in" in found.report(tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "an estimator supplied by the user" in found.report(tmp_path / "r.html").read_text(encoding="utf-8")
 
 
 def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
@@ -225,7 +225,7 @@ def test_selection(results: dict[str, Result], recording: Recording) -> None:
     assert set(found.sensors["z_um"]) <= {"t1_C", "t2_C", "t3_C"}
     methods: dict[SelectionMethod, str] = {
         "partial-f": "1 - R2",
-        "subsets": "RMS left out [um]",
+        "subsets": "RMS on left-out cycles [um]",
         "ace": "1 - mean Psi z_um",
     }
     for method, shown in methods.items():
@@ -307,12 +307,12 @@ def test_simulate() -> None:
 def test_what_cannot_be_frozen_is_not_fitted(recording: Recording) -> None:
     with pytest.raises(InputError, match="HistGradientBoostingRegressor cannot be stored as coefficients"):
         tc.fit(recording, "z_um", HistGradientBoostingRegressor())
-    with pytest.raises(InputError, match="treats every row as a machine at rest"):
+    with pytest.raises(InputError, match="treats every row as a steady state"):
         tc.compare(recording, "z_um", [tc.DynamicRidge(time="none")])
     # found out in its fit: the others have their results
     still = make_pipeline(tc.SensorSelector(), tc.DynamicRidge(time="none"))
     table = tc.compare(recording, "z_um", [still, "ols"]).to_frame().set_index("model")
-    assert "treats every row as a machine at rest" in table["reason"]["SensorSelector + DynamicRidge"]
+    assert "treats every row as a steady state" in table["reason"]["SensorSelector + DynamicRidge"]
     assert np.isfinite(table["rms"]["ols"])
 
 

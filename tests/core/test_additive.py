@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.terms import Variable

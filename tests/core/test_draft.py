@@ -261,8 +261,8 @@ def test_what_is_no_place_for_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
     there = sorted(tmp_path.iterdir())
     for name, said in (
         ("round", "round: cannot be written: Too many levels of symbolic links"),
-        ("nowhere", "nowhere: there is no folder .*/gone; make it first"),
-        ("gone/file", "gone/file: there is no folder .*/gone; make it first"),
+        ("nowhere", "nowhere: there is no folder .*/gone; create it first"),
+        ("gone/file", "gone/file: there is no folder .*/gone; create it first"),
         ("file/file", "file/file: cannot be written: Not a directory"),
         (".", "is a folder; name a file"),
         ("pipe", "pipe: is a pipe or a device"),

@@ -111,7 +111,7 @@ def test_other_families_say_no_contributions() -> None:
     told = explain(replace(lags(room=True), support=Support("fade", 0.1)))
     assert [s.bound for s in told.sensors] == [None, None]
     assert "Adds at most" not in str(told)
-    assert "widened by 10 %, and the answer fades to zero." in str(told)
+    assert "widened by 10 %, and the output fades to zero." in str(told)
     assert "the first reading after a start" in told.zero
     absolute = lags()
     assert explain(absolute).zero == "nothing: its inputs are absolute"

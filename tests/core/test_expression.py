@@ -10,7 +10,8 @@ from families import CURVES, FAMILIES, HEAD, INPUTS, MIXED, READINGS, SINGLES
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial

@@ -134,7 +134,7 @@ def test_formula_and_coefficients() -> None:
         ({"output_weights": ((1.0, float("nan")),)}, "must be finite"),
         ({"output_thresholds": (float("inf"),)}, "must be finite"),
         ({"output_thresholds": ()}, "both layers need at least one node"),
-        ({"hidden": "relu"}, "unknown activation function 'relu'; known are sigmoid, tanh, identity"),
+        ({"hidden": "relu"}, "unknown activation function 'relu'; expected one of sigmoid, tanh, identity"),
     ],
 )
 def test_a_net_refuses_numbers_that_do_not_fit(change: dict[str, Any], message: str) -> None:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
 from thermocomp.core.band import Band
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic

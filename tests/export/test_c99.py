@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from spoiling import FAILURES
 from watchedmachine import failing, watched_model
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
 from thermocomp.core.correction import Limits
+from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 from watchedmachine import watched_model
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
 from thermocomp.core.correction import Limits
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input, Support
 from thermocomp.core.joint import JointSupport

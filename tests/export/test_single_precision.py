@@ -15,10 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from watchedmachine import watched_model
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.bounds import COEFFICIENT, LEAST, round_single
 from thermocomp.core.correction import Limits
+from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel

@@ -15,7 +15,8 @@ import pytest
 from damage import spoil_json, spoil_toml
 from driftmodels import ACCEPTED, ROOM, SPEED, lags, net, static, ticking
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.core.fingerprints import Prints, Runs, pack_marks
 from thermocomp.core.inputs import Support

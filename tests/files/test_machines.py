@@ -276,7 +276,7 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
     (tmp_path / "altered_position.json").write_text(json.dumps(altered), encoding="utf-8")
     for text, message in (
         ('Y0C = {model = "half.json"}', "components.Y0C.model: "),
-        ('Y0C = {model = "half.json"}', "half.json: the file ends in the middle"),
+        ('Y0C = {model = "half.json"}', "half.json: the file is incomplete"),
         ('Y0C = {model = "altered.json", target = "a"}', "altered.json: its numbers do not match its checksum"),
         ('EYY = {model = "altered_position.json"}', "altered_position.json: its numbers do not match its checksum"),
         ('Y0C = {model = "."}', "cannot be read as a model file"),
@@ -299,7 +299,7 @@ def test_model_files_that_do_not_fit(tmp_path: Path) -> None:
         ('Z0C = {model = "refused.json"}', "components.Z0C.model: "),
         (
             'Z0C = {model = "refused.json"}',
-            "refused.json: model of z_um was refused and will not run: worse than none; fit a better one, or leave Z0C",
+            "refused.json: model of z_um was refused and will not run: worse than none; fit a better model, or leave",
         ),
         ('EYY = {model = "refused_slope.json"}', "model of EYY was refused and will not run: worse than none"),
     ):

@@ -108,7 +108,7 @@ def test_cut_anywhere_is_told_and_never_half_used() -> None:
 
 def test_cut_in_half_says_so() -> None:
     text = modelfile.dumps([model()])
-    with pytest.raises(ModelFileError, match="ends in the middle"):
+    with pytest.raises(ModelFileError, match="is incomplete"):
         modelfile.loads(text[: len(text) // 2])
 
 
@@ -119,7 +119,7 @@ def test_cut_in_half_says_so() -> None:
         (
             '"version": 1',
             '"version": 2',
-            "written by a newer thermocomp, version 2 of a model file; this one reads version 1: update",
+            "written by a newer thermocomp, version 2 of a model file; this thermocomp reads version 1: update it",
         ),
         ("thermocomp-model", "something-else", "not a model file"),
     ],
@@ -147,7 +147,7 @@ def altered(change: dict[str, object]) -> str:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"family": "oracle"}, "unknown family 'oracle'; known are polynomial, linear-dynamic"),
+        ({"family": "oracle"}, "unknown family 'oracle'; expected one of polynomial, linear-dynamic"),
         ({"direct": None}, "model 1: direct: is missing"),
         ({"surprise": 1}, "model 1: surprise: unknown key"),
         ({"direct": [1.0]}, "2 signals but 1 direct"),
@@ -179,7 +179,7 @@ def with_prints(change: dict[str, Any], run: dict[str, Any]) -> str:
         (
             {},
             {"rows": pack_marks(np.array([5, 6, 810], dtype=np.uint32))},
-            "one begins at row 810, but only 810 rows were recorded",
+            "a run begins at row 810, but only 810 rows were recorded",
         ),
         ({}, {"moving": "AAAAAA=="}, "1 values of moving for 3 rows"),
         ({}, {"marks": {}}, "expected fingerprints of at least one target"),

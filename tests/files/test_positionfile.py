@@ -127,7 +127,7 @@ def test_cut_anywhere_is_told_and_never_half_used() -> None:
         (
             '"version": 1',
             '"version": 2',
-            "written by a newer thermocomp, version 2 of a position model file; this one reads version 1: update",
+            "written by a newer thermocomp, version 2 of a position model file; this thermocomp reads version 1",
         ),
         ("thermocomp-position-model", "something-else", "not a position model file: it has no"),
     ],
@@ -166,7 +166,10 @@ def altered(change: dict[str, Any]) -> str:
         ({"unit": "mm"}, "model 1: unit: "),
         ({"axis": "B"}, "axis 'B': expected X, Y or Z"),
         ({"travel": [550.0, 0.0]}, "travel .* must increase"),
-        ({"profile": {"kind": "wavelet"}}, "model 1: profile: unknown kind 'wavelet'; known are polynomial, spline"),
+        (
+            {"profile": {"kind": "wavelet"}},
+            "model 1: profile: unknown kind 'wavelet'; expected one of polynomial, spline",
+        ),
         ({"profile": 3}, "model 1: profile: Input should be an object, found 3"),
         ({"profile": {"scale": [0.0, 1.0, 1.0]}}, "profile: scale must be from 1e-06 to 1e\\+07, found 0"),
         ({"profile": {"low": [0.0]}}, r"profile\.low\.1: is missing"),

@@ -59,7 +59,7 @@ class Fitted:
 def section() -> str:
     """Return what the documentation says of what goes where."""
     text = PAGE.read_text(encoding="utf-8")
-    return text.partition("What goes where\n")[2].partition("\nAs C\n")[0]
+    return text.partition("Models and targets\n")[2].partition("\nAs C\n")[0]
 
 
 def documented() -> dict[str, tuple[str, str, str]]:

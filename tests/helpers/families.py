@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
+from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.network import Affine, Network, Perceptron

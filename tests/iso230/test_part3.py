@@ -250,7 +250,7 @@ def test_noise_alone_stands_still(memory: float) -> None:
         if seed == 0:
             table = thermal_tables(test)[-1]
             assert table.rows[0][-1] == "still"
-            assert "its averages do not move beyond their noise" in table.caption
+            assert "its averages do not change by more than their noise" in table.caption
             assert any(n.startswith("y1_um, y2_um, z_um, A: the averages do not change") for n in test.notes)
     assert (still >= 95).all(), still
 
@@ -330,7 +330,7 @@ def test_what_falls_short_is_said() -> None:
     assert "the test ran for 29 min only" in notes
     assert "the spindle or an axis moves" in notes
     assert "the test is 0.5 h long" in notes
-    assert "no temperature is known to be that of the surroundings" in notes
+    assert "no ambient temperature was identified" in notes
     (unrecorded,) = assess(recorded({"z_um": np.arange(90.0)}), "axis")
     notes = " | ".join(unrecorded.notes)
     assert "the whole recording counts as warm-up; record the feed rate" in notes
@@ -408,7 +408,7 @@ def test_what_must_be_said_of_a_model() -> None:
     notes = " | ".join(test.notes)
     assert "was fitted to this recording" in notes
     assert "refused when it was fitted: worse than none" in notes
-    assert "z_um: with the model its range grows, from 50 to 90 um" in notes
+    assert "z_um: with the model its range increases, from 50 to 90 um" in notes
     assert "the model of nothing_um is not used: the recording has no channel" in notes
     with pytest.raises(InputError, match="but the recording has no such channel"):
         assess(recording, models=[model("nothing_um", 1.0)])

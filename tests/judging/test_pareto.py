@@ -111,7 +111,7 @@ def test_one_block_alone_does_not_mean_all_sensors() -> None:
     small = replace(one, none=np.array([[4.0]]))
     assert small.margin() == (0.2, 0.0, 0.2)
     assert small.enough("ols") == 4  # nothing less is near: then it is all of them, and said so
-    assert pareto.trade_off(small, "ols", 3) == "fewer cost more than the rule allows"
+    assert pareto.trade_off(small, "ols", 3) == "with fewer sensors the error exceeds the margin of the rule"
     assert pareto.trade_off(one, "ols", 1) == "2 sensors cost 0.45 um more than 4, the best of the table"
     assert pareto.trade_off(one, "ols", 0) == "1 sensor costs 0.8 um more than 4, the best of the table"
     other = by_hand([[2.3], [1.95], [1.4], [1.5]], [20.0])
@@ -140,12 +140,12 @@ def test_what_the_next_sensor_gains_and_whether_it_is_worth_it() -> None:
         pareto.next_to_buy(one, "ols", 0) == "Next to buy: b would gain 5.00 um (5.00 to 5.00 um from block to block)."
     )
     assert pareto.next_to_buy(one, "ols", 1) == (
-        "Next to buy: c would gain 0.70 um (0.70 to 0.70 um from block to block), which is less than the blocks differ "
-        "by: more thermal cycles would decide."
+        "Next to buy: c would gain 0.70 um (0.70 to 0.70 um from block to block), less than the differences between "
+        "the blocks: more thermal cycles would decide."
     )
     assert pareto.next_to_buy(one, "ols", 2) == (
-        "Next to buy: none is worth it. d would gain -0.50 um (-0.90 to -0.10 um from block to block); 0.50 um is what "
-        "a further sensor has to gain."
+        "Next to buy: none is worth it. d would gain -0.50 um (-0.90 to -0.10 um from block to block); a further "
+        "sensor must gain at least 0.50 um."
     )
     assert pareto.next_to_buy(one, "ols", 3).startswith("Next to buy: all temperatures are in use")
     few = replace(one, sensors=(("a",), ("a", "b", "c", "d")), rms=one.rms[:, [0, 3]])
@@ -161,9 +161,9 @@ def test_two_sensors_that_are_worth_it_together_are_named() -> None:
     assert margins[0] > 1.5 > 2 * margins[2]
     assert one.recommended() == ("ols", 0)
     assert pareto.next_to_buy(one, "ols", 0) == (
-        "Next to buy: no single one is worth it. b would gain 0.10 um (0.10 to 0.10 um from block to block); 0.50 um "
-        "is what a further sensor has to gain. b and c together would gain 1.50 um, which is less than the blocks "
-        "differ by: more thermal cycles would decide."
+        "Next to buy: no single one is worth it. b would gain 0.10 um (0.10 to 0.10 um from block to block); a further "
+        "sensor must gain at least 0.50 um. b and c together would gain 1.50 um, less than the differences between the "
+        "blocks: more thermal cycles would decide."
     )
     little = replace(one, rms=one.rms + np.array([0.0, 0.0, 0.6, 0.6])[:, None, None])
     assert pareto.next_to_buy(little, "ols", 0).startswith("Next to buy: none is worth it. b would gain 0.10 um")
@@ -235,7 +235,7 @@ def test_where_two_matter_two_are_recommended(seed: int) -> None:
         assert set(choice.sensors) == {"t1_C", "t2_C"}
         assert "2 sensors cost " in choice.reason
         assert choice.notes[0].startswith("Rule: the fewest sensors that are better than no compensation and whose")
-        assert ", is within 0." in choice.notes[0]
+        assert "(see the table) is within 0." in choice.notes[0]
 
 
 def test_fl_thermal_does_not_need_sixteen_sensors(shared_data: Path) -> None:
@@ -356,7 +356,7 @@ def test_a_copy_is_never_recommended_beside_what_it_copies() -> None:
     choice = pareto.choose(samples, splits.leave_one_cycle_out(samples), settings, jobs=1, progress=silent)
     assert len({"t1_C", "t7_C"} & set(choice.sensors)) < 2
     assert len({"t2_C", "t8_C"} & set(choice.sensors)) < 2
-    stands = next(t for t in choice.tables if t.title == "What stands in for what")
+    stands = next(t for t in choice.tables if t.title == "Virtual sensors")
     nearest = {row[0]: row[1:3] for row in stands.rows}
     assert nearest["t7_C"][0] == "t1_C"
     assert nearest["t2_C"][0] == "t8_C"

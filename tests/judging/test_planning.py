@@ -142,7 +142,7 @@ def test_one_cycle_is_enough_to_plan_from() -> None:
         ({"top_speed": float("inf")}, "top speed inf"),
         ({"hours": 1.0}, "a test of 1 h: expected 2 to 72"),
         ({"hours": float("nan")}, "expected 2 to 72"),
-        ({"swing": -3.0}, "a room that changes by -3 degC"),
+        ({"swing": -3.0}, "a change of the room temperature by -3 degC"),
     ],
 )
 def test_a_setting_that_cannot_be_is_refused(given: dict[str, float], words: str) -> None:
@@ -156,7 +156,7 @@ def test_recordings_that_cannot_be_planned_from_are_refused() -> None:
         plan(samples.only(["t_bearing_C", "t_air_C"]), TOP)
     with pytest.raises(InputError, match="one spindle speed and at least one temperature"):
         plan(samples.only(["spindle_rpm"]), TOP)
-    with pytest.raises(FitError, match="0 rows with all inputs and targets"):
+    with pytest.raises(FitError, match="0 rows contain all inputs and targets"):
         plan(replace(samples, deviations=np.full_like(samples.deviations, np.nan)), TOP)
     still = stack([recorded([(0.0, 300.0)])], ["z_um"])
     with pytest.raises(InputError, match="never turned in these recordings: record a run"):

@@ -56,7 +56,7 @@ def test_grouping_puts_the_repeating_sensors_together(choices: dict[str, tuple[C
     groups = [set(str(row[1]).split()) for row in table(choice, "Groups").rows]
     assert any({"t1_C", "t4_C"} <= g for g in groups)
     assert isinstance(choice.details, CorrelationGrouping)
-    thresholds = table(choice, "What other")
+    thresholds = table(choice, "Results with other")
     assert thresholds.marked is not None
     low, high, n_groups, sensors = thresholds.rows[thresholds.marked][:4]
     assert isinstance(low, float)
@@ -116,7 +116,7 @@ def test_the_budget_is_within_its_limit(choices: dict[str, tuple[Choice, ...]]) 
 
 def test_what_to_buy_next_is_what_the_next_row_has_more(choices: dict[str, tuple[Choice, ...]]) -> None:
     (choice,) = choices["pareto"]
-    errors, bought = table(choice, "Error on unseen blocks: "), table(choice, "What to buy next")
+    errors, bought = table(choice, "Error on unseen blocks: "), table(choice, "Next sensor to buy")
     for (size, joins, gain, worst, best), row, following in zip(
         bought.rows, errors.rows, errors.rows[1:], strict=False
     ):
@@ -133,7 +133,7 @@ def test_what_to_buy_next_is_what_the_next_row_has_more(choices: dict[str, tuple
 def test_stand_ins_name_the_copy(choices: dict[str, tuple[Choice, ...]]) -> None:
     """t4_C repeats t1_C; the chosen sensors make up each of the others, and are made up from the others of them."""
     (choice,) = choices["pareto"]
-    stands = table(choice, "What stands in")
+    stands = table(choice, "Virtual sensors")
     assert [row[0] for row in stands.rows] == [f"t{k}_C" for k in range(1, 7)]
     nearest = {str(row[0]): row[1:3] for row in stands.rows}
     assert nearest["t4_C"][0] == "t1_C"

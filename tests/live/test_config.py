@@ -111,7 +111,7 @@ def test_all_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_config(written(tmp_path, text))
     lines = str(caught.value).splitlines()
-    assert lines[0].endswith("4 to correct:")
+    assert lines[0].endswith("4 errors to correct:")
     for word in ("limits.rates", "page.port", "sinks.1.fil ", "sinks.1.file"):
         assert any(word in line for line in lines)
     assert len(lines) == 5
@@ -185,7 +185,7 @@ def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.M
             read_config("serve.toml")
         except InputError as e:
             first, *rest = str(e).splitlines()
-            assert first == f"serve.toml: {len(rest)} to correct:"
+            assert first == f"serve.toml: {len(rest)} error{'s' if len(rest) > 1 else ''} to correct:"
             refused += 1
     assert refused > 1500
 
@@ -193,7 +193,7 @@ def test_whatever_is_written_there_is_told_not_a_traceback(monkeypatch: pytest.M
 def test_all_that_does_not_fit_together_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_config(written(tmp_path, 'models = []\nsources = []\nown_compensation = "on"\n'))
-    assert str(caught.value).splitlines()[0].endswith("3 to correct:")
+    assert str(caught.value).splitlines()[0].endswith("3 errors to correct:")
 
 
 def test_there_is_none(tmp_path: Path) -> None:

@@ -65,11 +65,13 @@ def test_show(live: Journal, capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.removeprefix(stamp) for line in lines[3:]] == [
         "state  z_um holding: no reading for [bold]3 s",
         "reference  z_um is re-zeroed: homing",
-        "measurement  z_um probing +2.00 um under a correction of -10.00 um, not in its frame; deviation +12.00 um",
-        "measurement  z_um work_offset +12.00 um under a correction of -10.00 um, in its frame; deviation +12.00 um; "
-        "the correction is in it, and counts twice while it stays in force",
-        "measurement  z_um tool_length +12.00 um under no correction, in its frame; deviation +12.00 um",
-        "measurement  z_um probing +12.00 um under unknown correction, not in its frame; the deviation is not known",
+        "measurement  z_um probing +2.00 um under a correction of -10.00 um, not included in the value; "
+        "deviation +12.00 um",
+        "measurement  z_um work_offset +12.00 um under a correction of -10.00 um, included in the value; "
+        "deviation +12.00 um; the correction counts twice while it remains in force",
+        "measurement  z_um tool_length +12.00 um under no correction, included in the value; deviation +12.00 um",
+        "measurement  z_um probing +12.00 um under an unknown correction, not included in the value; "
+        "the deviation is not known",
         "alarm  sensor: t1_C stuck",
         "update  z_um measured +12.00 um, +10.00 to +11.50 um",
         "update  z_um measured +99.00 um, refused: measure again",
@@ -110,7 +112,7 @@ def test_a_run_beside_another_compensation_is_refused(
     assert "compensation: unknown" in capsys.readouterr().out
     for words in (["fit", "-o", "model.json"], ["compare"]):
         assert run([words[0], "week.csv", "--target", "z_um", "--jobs", "1", *words[1:]]) == 2
-        assert "week.csv: compensation: unknown: nobody knows which correction" in capsys.readouterr().err
+        assert "week.csv: compensation: unknown: the correction in force" in capsys.readouterr().err
     assert not Path("model.json").exists()
 
 
@@ -121,7 +123,7 @@ def test_a_run_beside_another_compensation_is_refused(
         (["show", "live.db", "-o", "x.csv"], "journal show writes no file"),
         (["show", "live.db", "--last", "-1"], "--last -1: must not be negative"),
         (["export", "live.db"], "name the recording to write"),
-        (["export", "live.db", "-o", "x.xlsx"], "a recording is written as .csv or .parquet"),
+        (["export", "live.db", "-o", "x.xlsx"], "a recording can only be written as .csv or .parquet"),
         (["export", "live.db", "-o", "x.csv", "--every", "-1"], "--every -1: must not be negative"),
         (["export", "live.000001.db", "-o", "live.000001.db", "--overwrite"], "is also an input"),
     ],

@@ -276,7 +276,7 @@ def test_what_was_never_measured_has_its_correction(tmp_path: Path) -> None:
 
 def test_journals_that_are_no_recording(tmp_path: Path) -> None:
     start = StartRow(BEGIN, (TargetRow("z_um"),), (HEAT,), "off", 15.0)
-    with pytest.raises(InputError, match=r"live\.000001\.db: the journal holds no reading yet"):
+    with pytest.raises(InputError, match=r"live\.000001\.db: the journal contains no reading yet"):
         export(journal_of(tmp_path / "live.db", start, []))
     other = start._replace(channels=(Channel("t1_C", "displacement", "um"),))
     with pytest.raises(

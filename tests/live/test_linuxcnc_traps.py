@@ -176,7 +176,7 @@ def test_who_may_connect_and_what_is_not_understood() -> None:
             await LinuxCncSink(path=machine.socket, axes={"z_um": "Z"}).connect(5.0)
 
     async def refused() -> None:
-        with pytest.raises(ThermocompError, match="axis Y is not corrected there"):
+        with pytest.raises(ThermocompError, match="LinuxCNC does not correct axis Y"):
             await LinuxCncSink(path=machine.socket, axes={"y_um": "Y"}).connect(5.0)
         with pytest.raises(ThermocompError, match="there is no socket"):
             await LinuxCncSink(path=machine.folder / "none", axes={"z_um": "Z"}).connect(5.0)

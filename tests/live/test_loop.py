@@ -528,5 +528,5 @@ def test_an_alarm_is_told_and_suspends_nothing() -> None:
     asyncio.run(running(service, work))
     assert [e.text for e in service.events if e.kind == "link" and e.text.startswith("z_um")] == [
         "z_um: the controller does not respond",
-        "z_um: is in force as it shall be again",
+        "z_um: the correction is in force again as commanded",
     ]

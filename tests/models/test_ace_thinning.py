@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input
 from thermocomp.files import modelfile
 from thermocomp.models.ace import ACE

@@ -269,9 +269,9 @@ def test_bad_input_is_refused(estimator: ThermalRegressor) -> None:
     with pytest.raises(ValueError, match="1 sample"):
         estimator.fit(X[:1], y[:1])
     if isinstance(estimator, ShrunkRegressor):
-        with pytest.raises(FitError, match="no row to learn from"):
+        with pytest.raises(FitError, match="no training rows"):
             estimator.fit(X, y, cycle=np.full(20, -1))
-        with pytest.raises(FitError, match="a single row to learn from"):
+        with pytest.raises(FitError, match="only one training row"):
             estimator.fit(X, y, cycle=np.r_[0, np.full(19, -1)])
         with pytest.raises(InputError, match="cycle: expected 20 numbers"):
             estimator.fit(X, y, cycle=[0, 1])

@@ -138,9 +138,9 @@ def test_bad_input_is_refused() -> None:
         CorrelationGrouping().fit(np.full((20, 2), 21.5), y)
     with pytest.raises(FitError, match="none of the 0 temperatures varies"):
         CorrelationGrouping(reference=0).fit(X[:, :1], y)
-    with pytest.raises(InputError, match="no input is named 'T14'; there are x0, x1, x2"):
+    with pytest.raises(InputError, match="no input is named 'T14'; the inputs are x0, x1, x2"):
         CorrelationGrouping(reference="T14").fit(X, y)
-    with pytest.raises(InputError, match="reference 3: there are 3 inputs"):
+    with pytest.raises(InputError, match="reference 3: expected an index from 0 to 2"):
         CorrelationGrouping(reference=3).fit(X, y)
     with pytest.raises(InputError, match="from -1 to 1"):
         CorrelationGrouping(threshold=90).fit(X, y)

@@ -169,7 +169,7 @@ def test_bad_input(samples: Samples) -> None:
         DynamicRidge(time="routed").fit(X, y, dt=[1.0, 2.0])
     with pytest.raises(InputError, match="cycle: expected 800 numbers"):
         DynamicRidge(time="none").fit(X, y, cycle=[0, 1])
-    with pytest.raises(FitError, match="no row to learn from"):
+    with pytest.raises(FitError, match="no training rows"):
         DynamicRidge(time="none").fit(X, y, cycle=np.full(len(X), -1))
 
 

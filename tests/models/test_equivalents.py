@@ -126,7 +126,7 @@ def test_too_few_data_sets() -> None:
     five = equivalents([values[:, :5]], subsets)
     assert five.equivalent.all()
     assert five.common == tuple(subsets)
-    assert "displacement 0: 5 data sets are too few: the smallest p value there can be is 0.062" in five.notes[0]
+    assert "displacement 0: 5 data sets are too few: the smallest possible p value is 0.062" in five.notes[0]
     assert "every set counts as equivalent" in five.notes[0]
     six = equivalents([values], subsets)
     assert six.equivalent.tolist() == [[True, False, False, False]]

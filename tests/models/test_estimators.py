@@ -245,7 +245,7 @@ def test_bad_settings_are_refused() -> None:
         PartialF(f_enter=10, f_delete=20).fit(T, y)
     with pytest.raises(InputError, match="alpha-to-enter"):
         SecondOrderRegression(alpha_enter=0.1, alpha_remove=0.05).fit(T, y)
-    with pytest.raises(InputError, match="no input is named 'T99'; there are T1, T2"):
+    with pytest.raises(InputError, match="no input is named 'T99'; the inputs are T1, T2"):
         SecondOrderRegression(differences=(("T1", "T99"),)).fit(T, y)
-    with pytest.raises(InputError, match="no variable is named 'T6-T7'; there are T1, T2"):
+    with pytest.raises(InputError, match="no variable is named 'T6-T7'; the variables are T1, T2"):
         SecondOrderRegression(subset=("T1", "T6-T7")).fit(T, y)

@@ -135,10 +135,10 @@ def test_a_named_estimator_survives_the_way_to_another_process() -> None:
 @pytest.mark.parametrize(
     ("thing", "message"),
     [
-        (Plane, r"Plane is a class: give an instance, Plane\(\)"),
-        (3.0, "float is not a regressor: name a method, or give an instance"),
+        (Plane, r"Plane is a class: pass an instance, Plane\(\)"),
+        (3.0, "float is not a regressor: name a method, or pass an instance"),
         (StandardScaler(), "StandardScaler is not a regressor"),
-        (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) treats every row as a machine at rest"),
+        (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) treats every row as a steady state"),
         (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot pass it the time here"),
         (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),
         ("oss", "unknown model 'oss'; did you mean ols"),
@@ -154,7 +154,7 @@ def test_a_pipeline_with_a_model_at_rest_is_refused(samples: Samples) -> None:
     resting = make_pipeline(SensorSelector("partial-f"), DynamicRidge(time="none"))
     found = compare(samples, [resting, "ols"], splits.leave_one_cycle_out(samples), robustness=False).overall()
     assert [bool(a.failure) for a in found] == [True, False, True, False]
-    assert "treats every row as a machine at rest" in found[0].reason
+    assert "treats every row as a steady state" in found[0].reason
 
 
 def test_one_number_per_row_or_none() -> None:
@@ -162,7 +162,7 @@ def test_one_number_per_row_or_none() -> None:
         def predict(self, X: ArrayLike) -> FloatArray:
             return np.zeros(3)
 
-    with pytest.raises(FitError, match=r"Wrong: predict gave an array of shape \(3,\) for 20 rows"):
+    with pytest.raises(FitError, match=r"Wrong: predict returned an array of shape \(3,\) for 20 rows"):
         ForeignRegressor(Wrong()).fit(np.eye(20), np.ones(20)).predict(np.eye(20))
 
 
@@ -223,9 +223,9 @@ class FrozenNan(Deployable, Nothing):
         (Unfit(), "Unfit cannot be fitted to z_um: TypeError: no table"),
         (Unasked(), "Unasked cannot predict: KeyError: 't9_C'"),
         (Nothing(), "Nothing predicts nan in 1 of"),
-        (Short(), "Short: predict gave an array of shape"),
-        (Text(), "Text predicts no numbers: could not convert string"),
-        (Transposed(), r"Transposed: predict gave an array of shape (1, "),
+        (Short(), "Short: predict returned an array of shape"),
+        (Text(), "Text predicts values that are not numbers: could not convert string"),
+        (Transposed(), r"Transposed: predict returned an array of shape (1, "),
         (Stubborn(), "Stubborn cannot be fitted to z_um: RuntimeError: Cannot clone"),
         (FrozenNan(), "FrozenNan predicts nan in 1 of"),
     ],
@@ -322,7 +322,7 @@ def test_a_selector_of_a_pipeline_sees_only_what_is_learned_from(samples: Sample
 
 def test_pipelines_that_cannot_be_frozen(samples: Samples) -> None:
     X, y = samples.frame(), samples.deviations[:, 0]
-    with pytest.raises(FitError, match="this one is PolynomialFeatures, LeastSquares"):
+    with pytest.raises(FitError, match="this one consists of PolynomialFeatures, LeastSquares"):
         freeze(make_pipeline(PolynomialFeatures(), LeastSquares()).fit(X, y), target="z")
     with pytest.raises(FitError, match="Ridge has no 'freeze'"):
         freeze(Ridge().fit(X, y), target="z")

@@ -160,11 +160,11 @@ def test_bad_input_is_refused() -> None:
     T, S = np.asarray(t.temperatures).copy(), np.asarray(t.displacements)
     with pytest.raises(InputError, match="no test given"):
         maximal_correlations([])
-    with pytest.raises(FitError, match="short: 20 rows, but the boxcar holds 21"):
+    with pytest.raises(FitError, match="short: 20 rows, but the boxcar spans 21"):
         maximal_correlations([DataSet("short", T[:20], S[:20])])
     with pytest.raises(InputError, match=r"found the shapes \(90, 4\) and \(90,\)"):
         maximal_correlations([DataSet("t", T, S[:, 0])])
-    with pytest.raises(InputError, match=r"differ in their numbers.*\(3, 2\), \(4, 2\)"):
+    with pytest.raises(InputError, match=r"have different numbers.*\(3, 2\), \(4, 2\)"):
         maximal_correlations([t, DataSet("t", T[:, :3], S)])
     with pytest.raises(InputError, match=r"subset \(0, 9\): expected indices of the 4"):
         maximal_correlations([t], [(0, 9)])

@@ -124,7 +124,9 @@ def test_caution_about_more_parameters_than_rows() -> None:
     X, y = drift(51)
     fitted = SigmoidNet(hidden=8, n_epochs=300).fit(X[:, :5], y[:, 0])
     assert fitted.n_parameters_ == 57
-    assert fitted.caution_.startswith("the net has 57 weights and thresholds, but the 51 rows it learned count as")
+    assert fitted.caution_.startswith(
+        "the net has 57 weights and thresholds, but its 51 training rows are equivalent to only"
+    )
     # seven parameters, and rows of which a straight line leaves white noise
     rng = np.random.default_rng(0)
     x = rng.uniform(0, 1, (500, 1))
@@ -236,10 +238,10 @@ def test_scikit_learns_net_is_taken_over_as_it_is() -> None:
     np.testing.assert_allclose(fitted.predict(X), peer.predict(scaled) * y.std(axis=0) + y.mean(axis=0), atol=1e-6)
     assert not fitted.converged_
     assert fitted.n_iter_ == 30
-    assert fitted.caution_.startswith("scikit-learn's solver gave up: lbfgs failed to converge")
+    assert fitted.caution_.startswith("scikit-learn's solver stopped early: lbfgs failed to converge")
     enough = SklearnNet(hidden=1, alpha=1.0).fit(X, y[:, 2])
     assert enough.converged_
-    assert "gave up" not in enough.caution_
+    assert "stopped early" not in enough.caution_
 
 
 def test_other_warnings_of_scikit_learn_are_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -312,7 +314,7 @@ def test_no_row_to_learn_from() -> None:
         ({"order": "random"}, "order 'random'"),
         ({"momentum": 1.0}, "momentum 1.0"),
         ({"scaling": "none"}, "scaling 'none'"),
-        ({"max_patterns": 1}, "at most 1 patterns"),
+        ({"max_patterns": 1}, "maximum number of patterns 1"),
     ],
 )
 def test_bad_settings_are_refused(setting: dict[str, Any], message: str) -> None:

@@ -355,5 +355,5 @@ def test_too_few_states() -> None:
     few = Profiles("EYY", "um", "Y", made.points, made.values[:24], states(n_cycles=1))
     values = few.values.copy()
     values[2:] = np.nan
-    with pytest.raises(FitError, match="2 complete rows of EYY_k1"):
+    with pytest.raises(FitError, match="2 complete training rows of EYY_k1"):
         fit_position(replace(few, values=values), PositionOptions(method="ols"))

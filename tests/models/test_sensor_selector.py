@@ -85,9 +85,9 @@ def test_bad_settings(crowded: Samples) -> None:
     for wrong, message in (
         (SensorSelector("best"), "method 'best': expected one of grouping, partial-f"),
         (SensorSelector(keep=["t99"]), "keep 't99': the columns are t1_C"),
-        (SensorSelector(keep=[70]), "keep 70: there are 7 columns"),
-        (SensorSelector(keep=list(X.columns)), "every column is kept"),
-        (SensorSelector(time="routed"), "time='routed': give 'column' or None"),  # type: ignore[arg-type]
+        (SensorSelector(keep=[70]), "keep 70: expected an index from 0 to 6"),
+        (SensorSelector(keep=list(X.columns)), "keep contains every column"),
+        (SensorSelector(time="routed"), "time='routed': expected 'column' or None"),  # type: ignore[arg-type]
     ):
         with pytest.raises(InputError, match=message):
             wrong.fit(X, y)

@@ -238,7 +238,7 @@ def test_it_can_be_interrupted_and_tells_how_far_it_is(monkeypatch: pytest.Monke
     found = best_subsets(X, y, progress=stop, route="dropping")
     assert found.stopped == "interrupted"
     assert len(heard) == 1
-    assert heard[0].startswith("best subsets: 20 sets looked at in")
+    assert heard[0].startswith("best subsets: 20 sets examined in")
     assert len(found.best) == 14
     assert not found.proven
     kept = BestSubset(criterion="cycles", progress=stop).fit(X, y)

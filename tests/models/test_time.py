@@ -120,9 +120,9 @@ def test_without_a_declaration_everything_refuses(make: Callable[..., TimedRegre
         fitted.predict(X, dt=tests.dt())
     with pytest.raises(InputError, match=REMEDY):
         fitted.score(X, y)
-    with pytest.raises(InputError, match="fitted with time='column' and has time='none' now: fit it again"):
+    with pytest.raises(InputError, match="fitted with time='column' but now has time='none': fit it again"):
         fitted.set_params(time="none").predict(X)
-    with pytest.raises(InputError, match=r"time='hours' is not known; give it time='column'"):
+    with pytest.raises(InputError, match=r"unknown time='hours'; give it time='column'"):
         untold.set_params(time="hours").fit(X, y)
 
 
@@ -214,7 +214,9 @@ def test_a_scaled_time_or_none_at_all_is_refused(tests: Samples) -> None:
     right = make_pipeline(keep.set_output(transform="pandas"), make(time="column")).fit(X, y)
     assert right.score(X, y) > 0.9
     estimator: Any = make(time="column")
-    with pytest.raises(InputError, match=r"ends at 3\.\d+ s, which is no thermal test. It must be seconds"):
+    with pytest.raises(
+        InputError, match=r"ends at 3\.\d+ s, which is too short for a thermal test. It must be in seconds"
+    ):
         estimator.fit(X.assign(time_s=X["time_s"] / 3600 / 2), y)
     with pytest.raises(InputError, match="never increases, so it is not the time"):
         estimator.fit(X.assign(time_s=0.0), y)
@@ -228,7 +230,9 @@ def test_a_scaled_time_or_none_at_all_is_refused(tests: Samples) -> None:
 
 def test_a_pause_is_refused_in_a_column_and_told_by_dt() -> None:
     time = np.r_[np.arange(0, 600, 10.0), np.arange(4200, 4800, 10.0)]
-    with pytest.raises(InputError, match=r"3610 s pass before row 60, 10 s as a rule.*needs time='routed'"):
+    with pytest.raises(
+        InputError, match=r"row 60 comes 3610 s after the previous row, where 10 s are usual.*use time='routed'"
+    ):
         derive_steps(time)
     assert derive_steps(np.r_[0.0, 10, 20, 0, 30, 60]).tolist() == [np.inf, 10, 10, np.inf, 30, 30]
     assert derive_steps(np.r_[0.0, 95, 100]).tolist() == [np.inf, 95, 5]
@@ -237,7 +241,7 @@ def test_a_pause_is_refused_in_a_column_and_told_by_dt() -> None:
 def test_the_end_of_a_test_alone_is_refused_when_routed(tests: Samples) -> None:
     dt: Any = pd.Series(tests.dt())
     fitted: Any = MAKERS["dynamic"](time="routed").fit(tests.frame(), tests.deviations[:, 0], dt=dt)
-    with pytest.raises(InputError, match="first row comes 60 s after another, and its test must start with inf"):
+    with pytest.raises(InputError, match="first row is 60 s after another row, but a test must start with inf"):
         fitted.predict(tests.frame().iloc[100:], dt=dt.iloc[100:])
 
 
@@ -246,9 +250,9 @@ def test_at_rest_is_for_the_checks_alone(tests: Samples) -> None:
     with pytest.raises(InputError, match="dt was given to DynamicRidge"):
         still.fit(tests.frame(), tests.deviations[:, 0], dt=tests.dt())
     still.fit(tests.frame(), tests.deviations[:, 0])
-    with pytest.raises(FitError, match="treats every row as a machine at rest; fit it with time='column'"):
+    with pytest.raises(FitError, match="treats every row as a steady state; fit it with time='column'"):
         still.freeze(target="z")
-    with pytest.raises(InputError, match="treats every row as a machine at rest"):
+    with pytest.raises(InputError, match="treats every row as a steady state"):
         still.routed()
 
 
@@ -280,7 +284,7 @@ def test_routed_by_scikit_learn(tests: Samples) -> None:
         # a scorer by name passes nothing on to predict
         nothing, said = scores(requested, X, y, cv=leave, params=params, scoring="neg_root_mean_squared_error")
         assert np.isnan(nothing).all()
-        assert "score with scoring=None, or use time='column'" in said
+        assert "use scoring=None, or use time='column'" in said
         for cv in (KFold(4), KFold(4, shuffle=True, random_state=0)):
             parts, said = scores(requested, X, y, cv=cv, params={"dt": params["dt"], "cycle": groups})
             assert np.isnan(parts).all()

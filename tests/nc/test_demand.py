@@ -52,7 +52,9 @@ class _Mad(Steady):
         return 0.0, 0.0, self.z
 
 
-@pytest.mark.parametrize(("z", "said"), [(math.nan, "finite"), (math.inf, "finite"), (401.0, "is no thermal drift")])
+@pytest.mark.parametrize(
+    ("z", "said"), [(math.nan, "finite"), (math.inf, "finite"), (401.0, "is not plausible as thermal drift")]
+)
 @pytest.mark.parametrize("every", [None, 60.0])
 def test_what_is_no_thermal_drift_is_refused(z: float, said: str, every: float | None) -> None:
     with pytest.raises(InputError, match=said):

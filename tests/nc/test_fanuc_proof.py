@@ -11,7 +11,11 @@ from thermocomp.core.exceptions import InputError, ProgramError, Unprovable
 from thermocomp.nc.linuxcnc.verification.verify import prove
 
 #: why a random program is refused
-FOR_A_REASON = ("uses the offset that holds the correction", "has not been positioned", "is no thermal drift")
+FOR_A_REASON = (
+    "uses the offset that holds the correction",
+    "has not been positioned",
+    "is not plausible as thermal drift",
+)
 
 pytestmark = pytest.mark.usefixtures("interpreter")
 

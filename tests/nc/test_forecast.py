@@ -48,8 +48,8 @@ def test_decimal_commas(tmp_path: Path, delimiter: str) -> None:
         ("time_s,cycle\n1,2\n", "column of an input"),
         ("time,t3_C\n1,2\n", "unit in the heading: time_s"),
         ("timestamp,t3_C\n2026-01-01,2\n", "since the start of the program"),
-        ("time_s,t3_C\n1,2\n1,3\n", r"line 3, column 'time_s': '1': times must be given and increase"),
-        ("time_s,t3_C\n1,2\n,3\n", "times must be given"),
+        ("time_s,t3_C\n1,2\n1,3\n", r"line 3, column 'time_s': '1': every row needs a time later than"),
+        ("time_s,t3_C\n1,2\n,3\n", "every row needs a time"),
         ("time_s,t3_C\n1,warm\n", "line 2, column 't3_C': 'warm' is not a number"),
         ("time_s,t3_C\n1,nan\n", "must be finite"),
         ("time_s,t3_C\n1,2,3\n", "line 2 has 3 cells, but there are 2 headings"),
@@ -90,7 +90,7 @@ def test_a_forecast_is_a_file_of_sane_size(tmp_path: Path) -> None:
     (tmp_path / "long.csv").write_text(f'time_s,"{"x" * 140_000}"\n0,1\n')
     for name, message in (
         ("pipe.csv", "is a pipe or a device"),
-        ("huge.csv", "more than 64 MiB"),
+        ("huge.csv", "exceeds 64 MiB"),
         ("long.csv", "line 1 cannot be read: field larger"),
     ):
         with pytest.raises(InputError, match=message):

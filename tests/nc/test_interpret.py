@@ -242,7 +242,7 @@ def test_the_motion_code_of_an_optional_line(text: str, line: int) -> None:
         assert run(text)
         return
     with pytest.raises(
-        ProgramError, match=f"line {line}: .*(takes its motion code G1 from an optional line|optional line)"
+        ProgramError, match=f"line {line}: .*(its motion code is G1, from an optional line|optional line)"
     ):
         run(text)
 

@@ -60,7 +60,7 @@ def test_damage_is_refused(left: JobState, tmp_path: Path) -> None:
     content["models"][0]["state"]["stations"][2]["zero"] += 1e-9
     with pytest.raises(ModelFileError, match="checksum"):
         jobstate.loads(json.dumps(content))
-    with pytest.raises(ModelFileError, match="ends in the middle"):
+    with pytest.raises(ModelFileError, match="is incomplete"):
         jobstate.loads(text[: len(text) // 2])
     with pytest.raises(ModelFileError, match="version 2"):
         jobstate.loads(text.replace('"version": 1', '"version": 2'))
@@ -88,5 +88,5 @@ def test_what_is_no_state_is_refused(left: JobState, change: dict[str, object], 
 
 def test_a_file_is_of_one_job(left: JobState) -> None:
     body = json.loads(jobstate.dumps(left, NOON))["models"]
-    with pytest.raises(ModelFileError, match="holds the states of 2 jobs: expected one"):
+    with pytest.raises(ModelFileError, match="contains the states of 2 jobs; expected one"):
         jobstate.loads(jsonfile.pack(jobstate.KIND, body * 2))

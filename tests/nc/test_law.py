@@ -59,11 +59,11 @@ def test_a_random_program_keeps_the_law_or_is_refused(
     trial = tried(path, folder, Growing(), way, every)
     if isinstance(trial, Trial):
         doubt = unproved(trial)  # what it depends on is not stated: it is not written either
-        assert not doubt or "that is not stated, so it cannot be proved; " in doubt
+        assert not doubt or "not stated, so the program cannot be proved; " in doubt
     elif isinstance(trial, ProgramError):
         assert "please report" not in trial.reason  # it has not passed its own check
     else:
-        assert "is no thermal drift" in str(trial)  # a program of hours, a drift of 0.1 um/s
+        assert "is not plausible as thermal drift" in str(trial)  # a program of hours, a drift of 0.1 um/s
 
 
 @pytest.mark.long

@@ -23,8 +23,8 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     assert "part.ngc: 23 lines" in text
     assert "spindle 4000 to 6000 1/min; 2 tool changes" in text
     assert "Start: cold, drift counts from the start of the program; method coordinates, renewed by 1 um" in text
-    assert "but the models know the spindle speed alone" in text
-    assert "but no interpreter has judged it (--unproved); assumed: no stored rotation (--rotation), no G92" in text
+    assert "but the models use the spindle speed alone" in text
+    assert "but no interpreter has verified it (--unproved); assumed: no stored rotation (--rotation), no G92" in text
     assert "but no picture was drawn: matplotlib is not installed" in text
     assert "note no --machine: the times are those of a medium machining centre" in text
     expected = {"model.json", "part.ngc", "out.ngc", "out.ngc.diff", "out.ngc.csv", "out.ngc.job.json"}
@@ -35,7 +35,7 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     header = [line for line in lines if MARK in line]
     assert lines[1 : 1 + len(header)] == header
     assert all(line.startswith(f"({MARK} ") and line.endswith(")") and len(line) <= 80 for line in header)
-    assert header[-1] == f"({MARK} UNPROVED: NO INTERPRETER HAS JUDGED IT)"
+    assert header[-1] == f"({MARK} UNPROVED: NO INTERPRETER HAS VERIFIED IT)"
     assert "DO NOT REVISE AGAIN" in header[0]
     assert "2026-01-31, for linuxcnc" in header[1]
     assert any("model model.json " in line and line.endswith(" for Z)") for line in header)
@@ -196,7 +196,7 @@ def test_a_measured_start(job_folder: Path) -> None:
         (["--carried", "gone.json"], "gone.json: no such state file of a job"),
         (["--carried", "model.json"], "model.json: not a state file of a job"),
         (["--measured", "z=12"], "expected an axis or target, and a value with its unit"),
-        (["--cold", "--zero", "last"], "needs a state that is carried over"),
+        (["--cold", "--zero", "last"], "requires the state carried over"),
     ],
 )
 def test_the_start_has_to_be_stated(

@@ -25,8 +25,8 @@ def written(text: str) -> None:
     [
         (["--startup", "G7"], "--startup 'G7': startup codes may only be G61, G61.1 or G64, and G98 or G99"),
         (["--startup", "G64 P0.1", "--controller", "fanuc"], "--startup 'G64 P0.1': P and Q are tolerances"),
-        (["--diameter", "1=10 mm"], "--diameter is for --expand"),
-        (["--subroutines", "."], "--subroutines is for --expand"),
+        (["--diameter", "1=10 mm"], "--diameter requires --expand"),
+        (["--subroutines", "."], "--subroutines requires --expand"),
     ],
 )
 def test_what_is_told_has_to_make_sense(

@@ -50,14 +50,17 @@ def test_a_stored_rotation_has_to_be_told_if_x_is_corrected(
 ) -> None:
     write_models([judged(lags("x_um"))], "x.json")
     assert revise("--model", "x.json", *options) == code
-    assert ("(--rotation none) or which (--rotation 'G54=12 deg')" in said(capsys)) == (code == 2)
+    assert ("(--rotation none) or the angle (--rotation 'G54=12 deg')" in said(capsys)) == (code == 2)
 
 
 def test_where_no_system_is_named_each_may_be_in_force(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_models([judged(lags("x_um"))], "x.json")
     Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
     assert revise("--model", "x.json", "--rotation", "G54=12.5 deg") == 2
-    assert "(--rotation none) or write G54 before the first move, and which (--rotation 'G54=12 deg')" in said(capsys)
+    assert (
+        "(--rotation none) or write G54 before the first move, and state the angle (--rotation 'G54=12 deg')"
+        in said(capsys)
+    )
     assert revise("--model", "x.json", "--rotation", "none", proved=True) == 0
     assert "G92 (in half of them), G98/G99, system in force, origins" in capsys.readouterr().out
 
@@ -85,7 +88,7 @@ def test_table_picture_and_message_tell_one_figure(
     assert left > 1.5
     title = drawn[0].axes[0].get_title("left")
     assert title == (
-        f"Z: the tool drifts by up to {axis['drift_high_um']:.1f} um; in the cuts at most {left:.1f} um is left; "
+        f"Z: the tool drifts by up to {axis['drift_high_um']:.1f} um; residual in the cuts at most {left:.1f} um; "
         f"bound {left + 2:.1f} um"
     )
     gaps = [w for w in told["warnings"] if "could not follow" in w]
@@ -106,14 +109,14 @@ def test_what_another_offset_would_cost_is_told(job_folder: Path, capsys: pytest
     # half of the drift is gone at 600 mm: a sixth of that in 100 mm; at Z 300 three quarters are there
     assert most == pytest.approx(told["axes"][0]["without_um"] / 0.75 * 0.5 / 6, rel=0.05)
     assert told["other_offset_um"]["x"] == 0.0
-    sentence = f"100 mm of another offset cost up to Z {most:.1f} um"
-    assert f"it is made for G54 X0 Y0 Z300, T1 120 mm; {sentence}" in told["notes"]
+    sentence = f"100 mm offset change: error up to Z {most:.1f} um"
+    assert f"the correction is made for G54 X0 Y0 Z300, T1 120 mm; {sentence}" in told["notes"]
     header = Path("out.ngc").read_text(encoding="ascii").splitlines()
     assert f"({MARK} made for G54 X0 Y0 Z300, T1 120 mm)" in header
     assert f"({MARK} {sentence})" in header
     Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
     assert revise(*options, "--overwrite") == 0
-    note = f"it is made for G54 X0 Y0 Z300, T1 120 mm, G54 in force at the start; {sentence}"
+    note = f"the correction is made for G54 X0 Y0 Z300, T1 120 mm, G54 in force at the start; {sentence}"
     assert note in json.loads(capsys.readouterr().out)["notes"]
 
 

@@ -34,7 +34,7 @@ def test_a_speed_outside_the_trained_range_widens_the_bound(
     Path("part.ngc").write_text(PLATE.replace("S6000", "S12000"), encoding="ascii")
     outside, warnings = bound([], capsys)
     (warning,) = [w for w in warnings if "outside its range" in w]
-    assert "spindle_rpm went to 12000 1/min, and a model was trained from 0 to 6000 1/min" in warning
+    assert "spindle_rpm reached 12000 1/min, and a model was trained from 0 to 6000 1/min" in warning
     assert outside["model_um"] > inside["model_um"] + 5
 
 
@@ -97,7 +97,7 @@ def test_who_takes_an_unproven_model_stands_in_the_program(
     assert revise(*given, "--accept-unproven", "") == 2
     assert "expected a name and a reason" in said(capsys)
     assert revise(*given, "--accept-unproven", "M. Weber, trial on machine 7", "--json") == 0
-    assert f"({MARK} unproven, taken by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
+    assert f"({MARK} unproven, approved by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
     warnings = json.loads(capsys.readouterr().out)["warnings"]
     assert any("Approved by M. Weber, trial on machine 7" in w for w in warnings)
     assert "the model of Z was judged with a stated harm margin of 20 um" in warnings
@@ -108,7 +108,7 @@ def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[st
     along = ["--model", "along.json", "--axis", "a=Z at Z 0 mm", "b=Z at Z 40 mm", "--origin", "G54=0 mm, 0 mm, 0 mm"]
     axis, warnings = bound(along, capsys)
     assert axis["axis"] == "Z"
-    assert any("Z was needed 10.0 mm beyond its outermost station" in w for w in warnings)
+    assert any("Z was corrected at up to 10.0 mm beyond its outermost station" in w for w in warnings)
     rows = table()
     assert float(rows[11]["drift_z_um"]) > 1.5 * float(rows[10]["drift_z_um"])
 
@@ -127,14 +127,14 @@ def test_a_machine_file_tells_the_times(job_folder: Path, capsys: pytest.Capture
     Path("mill.toml").write_text(text.replace('acceleration = "0.5 m/s2"\n', "", 1), encoding="ascii")
     assert revise("--machine", "mill.toml", "--json", "--overwrite") == 0
     (note,) = json.loads(capsys.readouterr().out)["notes"]
-    assert "no acceleration of X: taken as 3 m/s2" in note
+    assert "no acceleration of X: assumed to be 3 m/s2" in note
     assert "rapid" not in note
     bare = "".join(f"[axes.{name}]\ntravel = ['-500 mm', '500 mm']\n" for name in "YXZ")
     Path("mill.toml").write_text(head + bare.replace("[axes.Y]", "[axes.Y]\nrapid = '9 m/min'"), encoding="ascii")
     assert revise("--machine", "mill.toml", "--json", "--overwrite") == 0
     rapid, acceleration = json.loads(capsys.readouterr().out)["notes"]
-    assert "no rapid of X, Z: taken as 30 m/min" in rapid
-    assert "no acceleration of X, Y, Z: taken as 3 m/s2" in acceleration
+    assert "no rapid of X, Z: assumed to be 30 m/min" in rapid
+    assert "no acceleration of X, Y, Z: assumed to be 3 m/s2" in acceleration
 
 
 def test_a_cut_outside_the_travel_is_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -174,13 +174,13 @@ def test_a_fanuc_program(job_folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert "line 11 cannot be translated for LinuxCNC: G92 with G52" in said(capsys)
     assert set(job_folder.iterdir()) == before
     assert revise("--controller", "fanuc", program="50%.nc", out="out.nc") == 0
-    assert "but no interpreter has judged it (--unproved)" in " ".join(capsys.readouterr().out.split())
+    assert "but no interpreter has verified it (--unproved)" in " ".join(capsys.readouterr().out.split())
     lines = Path("out.nc").read_bytes().decode("ascii").split("\r\n")
     assert lines[:2] == ["%", "O1234"]
     header = [line for line in lines if MARK in line]
     assert lines[2 : 2 + len(header)] == header
     assert all(line.startswith(f"({MARK} ") and line == line.upper() and "%" not in line for line in header)
-    assert f"({MARK} UNPROVED: NO INTERPRETER HAS JUDGED IT)" in header
+    assert f"({MARK} UNPROVED: NO INTERPRETER HAS VERIFIED IT)" in header
     words = [w for line in lines[2 + len(header) :] for w in line.split() if w.startswith("Z-")]
     assert words
     assert all(len(w.partition(".")[2]) <= 3 for w in words)
@@ -206,7 +206,7 @@ def test_a_fanuc_program_is_written_out(job_folder: Path, capsys: pytest.Capture
     )
     Path("part.nc").write_text(program.format("100."), encoding="ascii")
     assert revise("--controller", "fanuc", program="part.nc", out="out.nc") == 2
-    assert "line 8: M98 (subprogram call): subprograms are not followed; --expand writes it" in said(capsys)
+    assert "line 8: M98 (subprogram call): subprograms are not supported; --expand writes it" in said(capsys)
     assert revise("--controller", "fanuc", "--expand", program="part.nc", out="out.nc") == 0
     plain = Path("out.nc.expanded").read_text("ascii").splitlines()
     assert plain[6:13] == ["G1 Z0. F30.", "G91 Z-1.", "G90 X100.", "G91 Z-1.", "G90 X100.", "/X0.", "G90 G0 Z50."]
@@ -246,8 +246,11 @@ def test_what_the_interpreter_does_not_run_is_told(job_folder: Path, capsys: pyt
     before = set(job_folder.iterdir())
     assert revise(proved=True) == 2
     message = said(capsys)
-    assert "part.ngc: it cannot be proved: LinuxCNC's interpreter does not run the original: line 14: " in message
-    assert message.endswith("; --unproved writes it anyway, and its header says so")
+    assert (
+        "part.ngc: the revised program cannot be proved: LinuxCNC's interpreter does not run the original: line 14: "
+        in message
+    )
+    assert message.endswith("; --unproved writes it anyway, and its header states this")
     assert set(job_folder.iterdir()) == before
 
 

@@ -28,10 +28,10 @@ def test_panels_and_their_titles() -> None:
     figure = revision.draw(made(), [X, Z], [60.0, 300.0], "part.ngc, cold")
     x, z, speed = figure.axes
     assert x.get_title("left") == (
-        "X: the tool drifts by up to 0.0 um; in the cuts at most 0.0 um is left; the model was never judged: no bound"
+        "X: the tool drifts by up to 0.0 um; residual in the cuts at most 0.0 um; the model was never judged: no bound"
     )
     assert z.get_title("left") == (
-        "Z: the tool drifts by up to 20.0 um; in the cuts at most 0.8 um is left; bound 9.8 um"
+        "Z: the tool drifts by up to 20.0 um; residual in the cuts at most 0.8 um; bound 9.8 um"
     )
     assert speed.get_xlabel() == "time since the start of the program [min]"
     assert speed.get_xlim() == (0.0, 10.0)

@@ -153,9 +153,9 @@ def test_subprograms_in_other_files(run: Run, tmp_path: Path) -> None:
     (folder / "far.ngc").write_text("o<far> sub\n\nG0 Y[#1/0]\no<far> endsub\nM2\n", encoding="ascii")
     calls = run("G21\no<beside> call [4]\nG0 Z1\nM2\n")
     assert [(c.line, c.file) for c in calls if c.kind == "rapid"] == [(2, "beside.ngc"), (3, "")]
-    with pytest.raises(ProgramError, match=r"line 1: .*refuses it: o<far> was not found: .*\(--subroutines\)"):
+    with pytest.raises(ProgramError, match=r"line 1: .*refuses the program: o<far> was not found: .*\(--subroutines\)"):
         run("o<far> call [1]\nM2\n")
-    with pytest.raises(ProgramError, match="line 1: the interpreter refuses it: Attempt to divide by zero"):
+    with pytest.raises(ProgramError, match="line 1: the interpreter refuses the program: Attempt to divide by zero"):
         run("o<far> call [1]\nM2\n", subroutines=[folder])
     with pytest.raises(InputError, match="9 folders of subprograms"):
         run("M2\n", subroutines=[folder] * 9)
@@ -186,7 +186,7 @@ def test_start_and_parameters(run: Run) -> None:
     ],
 )
 def test_refused_with_line_and_words(run: Run, text: str, line: int, reason: str) -> None:
-    with pytest.raises(ProgramError, match=rf"line {line}: the interpreter refuses it: .*{reason}"):
+    with pytest.raises(ProgramError, match=rf"line {line}: the interpreter refuses the program: .*{reason}"):
         run(text)
 
 
@@ -285,9 +285,9 @@ def test_comments_of_any_bytes_are_read(run: Run, tmp_path: Path) -> None:
     calls = run("G21\n(ge\xe4ndert \xb5m)\n(MSG,\xe4)\nG0 X1\no<far> call\nM2\n")
     assert [c.text for c in calls if c.kind in ("comment", "message")][:2] == ["ge?ndert ?m", "?"]
     assert [(c.line, c.kind) for c in calls if c.kind == "rapid"] == [(4, "rapid"), (3, "rapid")]
-    with pytest.raises(ProgramError, match="line 2: the interpreter refuses it"):
+    with pytest.raises(ProgramError, match="line 2: the interpreter refuses the program"):
         run("G21\nG0 X1\xe4\nM2\n")
-    with pytest.raises(ProgramError, match=r"line 2: the interpreter refuses it: .*o<fr\?sen>"):
+    with pytest.raises(ProgramError, match=r"line 2: the interpreter refuses the program: .*o<fr\?sen>"):
         run("G21\no<fr\xe4sen> call\nM2\n")
 
 
@@ -316,7 +316,9 @@ def test_nothing_beside_a_program_is_run(tmp_path: Path, monkeypatch: pytest.Mon
 @pytest.mark.parametrize("comment", [";py,open({!r}, 'w')", "(py,open{{{!r}}})", "(PY,import os)"])
 def test_python_in_a_comment_is_not_run(run: Run, tmp_path: Path, comment: str) -> None:
     mark = tmp_path / "mark"
-    with pytest.raises(ProgramError, match=r"line 3: the interpreter refuses it: it contains Python code \(py, ...\)"):
+    with pytest.raises(
+        ProgramError, match=r"line 3: the interpreter refuses the program: it contains Python code \(py, ...\)"
+    ):
         run(f"G21\nG0 X1\n{comment.format(str(mark))}\nG0 X2\nM2\n")
     assert not mark.exists()
 

@@ -158,7 +158,7 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
     assert drift.deviation((0.0, 0.0, 100.0)) == pytest.approx((3.0, 0.0, 4.5), abs=1e-6)
     assert found.assumed == ()
     for wrong, says in [
-        ({"X": 3.0}, "that of Z is missing; also give Z=VALUEum"),
+        ({"X": 3.0}, "the deviation of Z is missing; also give Z=VALUEum"),
         ({"X": 3.0, "Y": 4.0}, "no measured axis or target 'Y'"),
         ({"X": 3.0, "Z": 4.0, "z_at_200": 5.0}, "Z and z_at_200 are both given; remove one"),
         ({"X": 3.0, "Z": 50.0}, r"Z \(the mean of 2 models\): 50 um; no speed from 0 to 6000 1/min causes it"),
@@ -166,7 +166,7 @@ def test_every_axis_and_station_is_measured_by_its_name() -> None:
         with pytest.raises(InputError, match=says):
             start.begin_measured(stations, wrong, {})
     three = [*stations, Station("Z", lags("z_at_400_um"), "Z", 400.0, shadow=True)]
-    with pytest.raises(InputError, match="that of Z at Z 400 mm is missing; also give z_at_400=VALUEum"):
+    with pytest.raises(InputError, match="the deviation of Z at Z 400 mm is missing; also give z_at_400=VALUEum"):
         start.begin_measured(three, {"X": 3.0, "z_at_0": 4.0, "z_at_200": 5.0}, {})
 
 
@@ -187,7 +187,7 @@ def test_one_measurement_fixes_all_stations_of_an_axis(other: Callable[..., Erro
     for name, value, told in [("z_at_0", low, 1), ("z_at_600_um", high, 0)]:
         found = start.begin_measured(stations, {name: value}, {})
         assert float(found.states[told].deviation) == pytest.approx((low, high)[told], abs=1e-5)
-        assert f"there {name} is {value:g} um" in found.assumed[0]
+        assert f"where {name} is {value:g} um" in found.assumed[0]
     both = Drift(stations, start.begin_measured(stations, {"z_at_0": low, "z_at_600": high}, {}), zero="cold")
     mine = Drift(stations, whole, zero="cold")
     assert mine.assumed == whole.assumed

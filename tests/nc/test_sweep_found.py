@@ -36,7 +36,7 @@ def test_one_peck_more_or_less_is_refused_where_the_tool_stands_at_r(tmp_path: P
     text = "S3000 M3\nG0 X0 Y0 Z20\nG4 P1\nG99 G73 X10 Z-3 R1 Q2.5 F170\nX20 Z-4\nG80\nM2\n"
     found = outcome(1, text, "coordinates", "Z", tmp_path, proof=True)
     assert found.kind == "refused"
-    assert "line 5: Q divides the way from R to Z" in found.reasons[0]
+    assert "line 5: Q divides the distance from R to Z" in found.reasons[0]
     found = outcome(
         1, text.replace("X20", "G80\nG0 Z20\nG99 G73 X20 R1 Q2.5"), "coordinates", "Z", tmp_path, proof=True
     )

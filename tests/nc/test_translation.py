@@ -237,8 +237,8 @@ def test_what_stands_at_the_other_control() -> None:
     ("text", "reason"),
     [
         ("G31 Z-5. F100", "probes"),
-        ("G92 X0.\nG92.1 X0. Y0. Z0.\nG52 X1.", "one store"),
-        ("G92 X0.\nG68 X0. Y0. R5.", "one store"),
+        ("G92 X0.\nG92.1 X0. Y0. Z0.\nG52 X1.", "one stored offset"),
+        ("G92 X0.\nG68 X0. Y0. R5.", "one stored offset"),
         ("G54.1 P1\nG54.1 P2\nG54.1 P3\nG54.1 P4", "can hold up to 3"),
         ("G10 L20 P1 X0.\nG10 L20 P2 X0.\nG10 L20 P3 X0.\nG10 L20 P4 X0.", "can hold up to 3"),
         ("G91 G10 L2 P1 X1.", "G10 in G91"),

@@ -217,7 +217,7 @@ def test_a_study_that_fails_leaves_the_others(
     page = tmp_path / "papers.html"
     assert run(["papers", first, second, "-o", str(page)]) == 1
     printed = capsys.readouterr().out
-    assert f"{first}: not redone" in printed
+    assert f"{first}: not reproduced" in printed
     assert "ZeroDivisionError: by <zero>" in printed
     assert f"Title of {second}" in printed
     text = page.read_text(encoding="utf-8")

@@ -145,7 +145,7 @@ def test_a_line_has_bounds(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["rec.xls", "rec", "rec.csv.gz"])
 def test_another_ending_is_told_with_those_that_are_read(tmp_path: Path, name: str) -> None:
-    with pytest.raises(RecordingError, match=r"are not read; save it as one of \.csv, .*\.xlsx, \.ods, \.parquet"):
+    with pytest.raises(RecordingError, match=r"cannot be read; save it as one of \.csv, .*\.xlsx, \.ods, \.parquet"):
         read(tmp_path / name)
 
 

@@ -148,11 +148,11 @@ def test_what_is_not_there_is_refused(step: Step, message: str) -> None:
 
 def test_steps_that_say_nothing_are_refused() -> None:
     for make, message in (
-        (lambda: Cut(("z_um",)), "name what is cut"),
-        (lambda: Shift(("z_um",)), "by how much"),
-        (lambda: Shift(by_s=4.0), "name whose clock"),
-        (lambda: Rezero(at=4.0), "name which probe"),
-        (lambda: Swap(("z_um",)), "name the two"),
+        (lambda: Cut(("z_um",)), "specify the rows to cut"),
+        (lambda: Shift(("z_um",)), "wrong clock and its correction"),
+        (lambda: Shift(by_s=4.0), "specify the channels with the wrong clock"),
+        (lambda: Rezero(at=4.0), "specify the probe"),
+        (lambda: Swap(("z_um",)), "specify the two"),
         (Resample, "give the interval"),
         (lambda: Resample(("z_um",), every_s=4.0), "no channels"),
     ):
@@ -163,5 +163,5 @@ def test_steps_that_say_nothing_are_refused() -> None:
 def test_a_table_with_several_rows_of_one_time_has_no_clock_to_shift() -> None:
     same_times = rows(every=0.0)
     for step in (Shift(("z_um",), by_s=4.0), Resample(every_s=4.0)):
-        with pytest.raises(InputError, match="needs a row per instant, and several rows have the same time"):
+        with pytest.raises(InputError, match="requires one row per time, but several rows have the same time"):
             clean(same_times, [step])

@@ -60,7 +60,7 @@ def test_what_fits_together_passes() -> None:
 
 def test_targets_are_what_a_model_can_learn() -> None:
     assert [c.name for c in compensated().displacements] == ["z_um", "x_um"]
-    with pytest.raises(InputError, match="input z_correction_um is a correction: it is what a model makes"):
+    with pytest.raises(InputError, match="input z_correction_um is a correction: it is the output of a model"):
         tc.fit(compensated(), "z_um", inputs=["t1_C", "z_correction_um"], jobs=1)
     with pytest.raises(InputError, match="input z_residual_um is a residual"):
         tc.fit(compensated(), "z_um", inputs=["t1_C", "z_residual_um"], jobs=1)
@@ -74,14 +74,14 @@ def test_targets_are_what_a_model_can_learn() -> None:
             "x_um",
             'small: compensation: unknown: .* compensation = "off"',
         ),
-        (compensated(), "z_residual_um", "z_residual_um is a residual .* as the target, z_um"),
-        (compensated(), "z_correction_um", "z_correction_um is a correction .* as the target, z_um"),
+        (compensated(), "z_residual_um", r"z_residual_um was recorded .*\(residual\): .* as the target, z_um"),
+        (compensated(), "z_correction_um", r"z_correction_um was recorded .*\(correction\): .* as the target, z_um"),
         (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um, which is z_residual_um - z_corr"),
         (compensated("z_residual_um"), "z_um", "z_um was measured while z_correction_um was in force"),
         (
             compensated(z_um=np.nan),
             "z_um",
-            "z_um is empty where z_residual_um has a value: compensation: unknown: nobody knows",
+            "z_um is empty where z_residual_um has a value: compensation: unknown: the correction in force",
         ),
     ],
 )

@@ -67,7 +67,7 @@ def months(begin: datetime, count: int) -> list[datetime]:
 def test_one_row_a_day_may_be_one_a_month(instants: list[datetime], form: str, tmp_path: Path) -> None:
     """The days of a month, each first of which follows another: 01/04, 01/05 ... of any machine that is measured."""
     path = written(tmp_path / "rare.csv", instants, f"{form} %H:%M")
-    with pytest.raises(TwoReadingsError, match="no row tells which"):
+    with pytest.raises(TwoReadingsError, match="no row shows which"):
         read(path)
     assert run(["map", str(path), "--yes"]) == 2
 
@@ -77,7 +77,7 @@ def test_an_order_that_is_stated_and_breaks_the_recording_is_asked_for(heading: 
     night = series(datetime(2024, 3, 5, 20), timedelta(minutes=5), 100)
     path = written(tmp_path / "night.csv", night, f"{form} %H:%M")
     path.write_text(path.read_text("utf-8").replace("Timestamp", heading), "utf-8")
-    with pytest.raises(TwoReadingsError, match="no row tells which"):
+    with pytest.raises(TwoReadingsError, match="no row shows which"):
         read(path)
     as_it_was(read(path, Mapping(time=TimeColumn(heading, format=f"{form} %H:%M"))), night)
 
@@ -86,7 +86,7 @@ def test_an_order_that_is_stated_and_breaks_the_recording_is_asked_for(heading: 
 def test_several_rows_on_each_of_some_days_do_not(form: str, tmp_path: Path) -> None:
     """Tests on the same day of several months look alike."""
     path = written(tmp_path / "days.csv", DAYS, f"{form} %H:%M")
-    with pytest.raises(TwoReadingsError, match="no row tells which"):
+    with pytest.raises(TwoReadingsError, match="no row shows which"):
         read(path)
     assert run(["map", str(path), "--yes"]) == 2
     as_it_was(read(path, Mapping(time=TimeColumn("Timestamp", format=f"{form} %H:%M"))), DAYS)
@@ -156,7 +156,7 @@ def test_what_changes_no_duration_is_taken_without_a_question(
 ) -> None:
     day = series(datetime(2024, 3, 5, 8), timedelta(minutes=10), 48)
     path = written(tmp_path / "day.csv", day, "%d/%m/%Y %H:%M")
-    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row tells which; state how"):
+    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row shows which; state how"):
         read(path)
     assert run(["map", str(path), "--yes"]) == 0
     assert "%d/%m/%Y" in capsys.readouterr().out

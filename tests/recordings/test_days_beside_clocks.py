@@ -98,7 +98,7 @@ def test_a_column_that_may_say_am_and_pm_is_asked_for(heading: str, words: tuple
 def test_a_format_of_24_hours_does_not_pass_over_pm(tmp_path: Path) -> None:
     path = write(tmp_path / "half.csv", "Time,AM/PM", two("#,AM", "#,PM"))
     time = {"column": "Time", "format": "%H:%M:%S"}
-    with pytest.raises(TwoReadingsError, match="24 hours") as caught:
+    with pytest.raises(TwoReadingsError, match="24-hour time") as caught:
         read(path, check_content({"time": time}, "mapping"))
     assert read(path, check_content(dict(caught.value.remedies[0]), "mapping")).time[-1] == HALF_DAY
 
@@ -194,7 +194,7 @@ def test_a_format_of_the_time_alone_loses_no_date(tmp_path: Path) -> None:
         read(path, check_content(said, "mapping"))
     left = read(path, check_content({**said, "columns": {"Date": {"role": "ignore"}}}, "mapping"))
     assert left.time[-1] == SAME_DAY
-    assert any("left out, as the mapping says" in note for note in left.notes)
+    assert any("left out, as the mapping specifies" in note for note in left.notes)
 
 
 def test_a_format_that_passes_over_the_day_loses_no_date(tmp_path: Path) -> None:

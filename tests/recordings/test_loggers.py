@@ -24,7 +24,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             "written in UTF-16-LE",
             "lines 1 to 16 above the headings are passed over",
-            "the dates are month/day/year: '05/27/2024 08:00:00.000' is none otherwise",
+            "the dates are month/day/year: '05/27/2024 08:00:00.000' is not a date otherwise",
         ),
     ),
     "catman.txt": (
@@ -88,7 +88,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "2024-05-27T11:56:00",
         (
             "T1 (Deg C): 'OL', taken as missing, in 2 of 48 cells: line 9, line 10",
-            "the dates are month/day/year: '5/27/2024 11:56:00 AM' is none otherwise",
+            "the dates are month/day/year: '5/27/2024 11:56:00 AM' is not a date otherwise",
         ),
     ),
     "swiss.csv": ("short", "", (CP1252, """thousands are separated by "'\"""")),
@@ -113,7 +113,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         BEGIN,
         (
             "thousands are separated by ','",
-            "the dates are month/day/year: '5/27/2024 8:00:00' is none otherwise",
+            "the dates are month/day/year: '5/27/2024 8:00:00' is not a date otherwise",
         ),
     ),
     "excel_unicode.txt": ("short", BEGIN, ("written in UTF-16-LE", COMMA)),
@@ -153,7 +153,7 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
         "full",
         "2024-04-03T08:00:00",
         "line 2, column 'Date': '03/04/2024 08:00:00' can be read as day/month/year or month/day/year, and no row "
-        "tells "
+        "shows "
         'which; state how it is written in a mapping: [time] column = "Time", date = "Date" and format = '
         '"%d/%m/%Y %H:%M:%S" or format = "%m/%d/%Y %H:%M:%S"',
         '[time]\ncolumn = "Time"\ndate = "Date"\nformat = "%d/%m/%Y %H:%M:%S"\n',
@@ -180,7 +180,7 @@ ASKED: dict[str, tuple[str, str, str, str]] = {
     "three_digits.csv": (
         "three",
         "",
-        "'21,500' can be read as 21500 or as 21.500, and no other number tells which; state the decimal sign "
+        "'21,500' can be read as 21500 or as 21.500, and no other number shows which; state the decimal sign "
         "in a "
         'mapping: [read] decimal = "," or decimal = "."',
         '[read]\ndecimal = ","\n',
@@ -230,7 +230,7 @@ def test_what_can_be_read_in_two_ways_is_asked_for(name: str, tmp_path: Path) ->
     assert str(caught.value) == f"{FOLDER / name}: {question}"
     (offer,) = caught.value.__notes__
     words, _, offered = offer.partition("\n\n")
-    assert words.startswith("by this mapping it is read")
+    assert words.startswith("this mapping reads it")
     for text in (offered, answer):
         mapping = tmp_path / "mapping.toml"
         mapping.write_text(text, encoding="utf-8")

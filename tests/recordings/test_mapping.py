@@ -40,7 +40,7 @@ def test_numbers_may_be_written_without_a_point(tmp_path: Path) -> None:
         ("[read]\ndelimeter = ';'\n", ["table [read]", "'delimeter'", "did you mean 'delimiter'"]),
         ('[time]\nstart = "1.3.2024 08:00"\n', ["[time]: start = '1.3.2024 08:00'", '"2024-03-01T08:00:00"']),
         ("[time]\nstart = 2024-03-01T08:00:00\n", ["table [time]", "'start'", "valid string"]),
-        ("[time]\nzzzzz = 1\n", ["table [time]", "'zzzzz'", "Known are column, unit, format, start, date"]),
+        ("[time]\nzzzzz = 1\n", ["table [time]", "'zzzzz'", "known keys: column, unit, format, start, date"]),
         ("[columns.z]\nscale = 'two'\n", ["table [columns.z]", "'scale' = 'two'", "valid number"]),
         ("[columns.z]\nzero = 'last'\n", ["table [columns.z]", "'zero' = 'last'", "first"]),
         ("[columns.z]\nrole = 'temprature'\n", ["table [columns.z]", "'role'", "'temperature'"]),

@@ -176,7 +176,7 @@ def offered(error: InputError) -> tuple[str, str]:
         ("time_s,T1 [C],Z [um]\n0,20.1,0.1\n10,20.3\n20,20.3,0.2\n", "line 3 has 2 cells", 2),
         ("time_s,T1 [C],Z [um]\n0,20.1,0.1\n10,warm,0.1\n20,20.3,0.2\n", "'warm' is not a number", 2),
         ("time_s,T1 [C],T1 (C),Z [um]\n0,20.1,20.0,0.1\n10,20.4,20.0,0.1\n", "would both become channel", 2),
-        ("time_s,T1 [C],cycle\n0,20.1,a\n10,20.4,\n20,20.4,a\n", "cycle's label is missing", 2),
+        ("time_s,T1 [C],cycle\n0,20.1,a\n10,20.4,\n20,20.4,a\n", "the label of the thermal cycle is missing", 2),
     ],
 )
 def test_an_error_offers_a_mapping_that_reads_the_file(content: str, message: str, rows: int, tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_an_error_offers_a_mapping_that_reads_the_file(content: str, message: st
     with pytest.raises(InputError, match=message) as caught:
         read_or_offer(path)
     words, toml = offered(caught.value)
-    assert words.startswith("by this mapping it is read; look it over, save it as my_file_1_.toml and give it")
+    assert words.startswith("this mapping reads it; check it, save it as my_file_1_.toml and give it")
     mapping = tmp_path / "my_file_1_.toml"
     mapping.write_text(toml, encoding="utf-8")
     assert len(read_or_offer(path, read_mapping(mapping))) == rows
@@ -249,7 +249,7 @@ def test_what_cannot_be_guessed_is_not_offered(content: str, message: str, tmp_p
     path.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=message) as caught:
         read_or_offer(path)
-    assert not any("by this mapping it is read" in note for note in getattr(caught.value, "__notes__", ()))
+    assert not any("this mapping reads it" in note for note in getattr(caught.value, "__notes__", ()))
 
 
 def test_days_and_stamps_without_signs_are_offered_as_what_they_are(tmp_path: Path) -> None:
@@ -262,7 +262,7 @@ def test_days_and_stamps_without_signs_are_offered_as_what_they_are(tmp_path: Pa
         with pytest.raises(InputError) as caught:
             read_or_offer(path)
         words, toml = offered(caught.value)
-        assert words.startswith("by this mapping it is read")
+        assert words.startswith("this mapping reads it")
         assert toml == f'[time]\ncolumn = "{name}"\n{keys}'
 
 

@@ -114,7 +114,7 @@ def test_dates_that_the_time_does_not_know_are_refused(what: str, heading: str, 
         read(path)
     left = read(path, check_content({"columns": {heading: {"role": "ignore"}}}, "mapping"))
     assert left.time[-1] == pytest.approx(60 * (len(INSTANTS) - 1))
-    assert any("left out, as the mapping says" in note for note in left.notes)
+    assert any("left out, as the mapping specifies" in note for note in left.notes)
 
 
 @pytest.mark.parametrize(("what", "heading", "way"), FORMS, ids=[f"{w}-{h}" for w, h, _ in FORMS])
@@ -139,7 +139,7 @@ def test_numbers_of_a_sheet_are_dates_too(cell: type, tmp_path: Path) -> None:
     for k, t in enumerate(INSTANTS):
         book.active.append([cell(t.strftime("%Y%m%d")), 60 * k, 20 + k / 9, k / 5])
     book.save(tmp_path / "days.xlsx")
-    with pytest.raises(TwoReadingsError, match=r"says 20240315 in row 42"):
+    with pytest.raises(TwoReadingsError, match=r"contains 20240315 in row 42"):
         read(tmp_path / "days.xlsx")
 
 

@@ -131,7 +131,9 @@ def test_columns_by_pattern_by_places_and_by_name(tmp_path: Path) -> None:
         read(tmp_path / "both.csv", "EYY")
     for pattern in ("y_laser_*", "y_laser_*_um"):
         same(read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns=pattern)), _with_zeros(found))
-    with pytest.raises(RecordingError, match=r"no column is called 'x_\*'; state which .* There are y_laser_0_um"):
+    with pytest.raises(
+        RecordingError, match=r"no column is called 'x_\*'; state which .* The columns are y_laser_0_um"
+    ):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="x_*"))
     with pytest.raises(InputError, match="put \\* where the position is"):
         read(tmp_path / "both.csv", ProfileOptions(target="EYY", columns="y_laser"))
@@ -261,9 +263,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
     ):
         read(path, "EYY")
     table.rename(columns={"y_mm": "x_mm"}).to_csv(path, index=False)
-    with pytest.raises(
-        RecordingError, match=r"no column of positions is called position_mm or pos_mm or y_mm.*are x_mm"
-    ):
+    with pytest.raises(RecordingError, match=r"no column of positions is called position_mm or pos_mm or y_mm.*: x_mm"):
         read(path, "EYY")
     table.rename(columns={"y_mm": "travel", "error_um": "e"}).to_csv(path, index=False)
     roles = {"y_mm": ColumnMap("travel", "mm", "position"), "error": ColumnMap("e", "um", "displacement")}
@@ -274,7 +274,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(path, options, Mapping(columns=named)).values, found.values)
     labelled = table.assign(state=np.repeat(range(len(found)), 12), time_s=0.0)
     labelled.to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="line 14: a new state begins at the time of the one before"):
+    with pytest.raises(RecordingError, match="line 14: a new state begins at the same time as the previous one"):
         read(path, "EYY")
 
 

@@ -221,7 +221,7 @@ def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, v
 
     assert (found.severity, found.kind) == (severity, "implausible")
     assert "2 values of 2000" in found.text
-    assert f"the farthest {value:g} at row 300 (4500 s)" in found.text
+    assert f"the most extreme {value:g} at row 300 (4500 s)" in found.text
     assert [f.kind for f in _check(stuck, quantity)] == ["implausible", "stuck"]
 
 
@@ -291,7 +291,7 @@ def test_one_cycle_is_told_with_its_reason() -> None:
     once = np.where(TIME < 7500, 3000.0, 0.0)
     still = replace(turning, table=turning.table.assign(n=once)).with_cycles(make_single_cycle(N))
     assert "does not start again" in check(still)[0].text
-    assert "starts has a stop and a run of 300 s" in check(turning.with_cycles(make_single_cycle(N)))[0].text
+    assert "starts has a stop of 300 s before it" in check(turning.with_cycles(make_single_cycle(N)))[0].text
 
 
 def test_a_drift_of_millimetres_is_another_unit() -> None:

@@ -118,11 +118,11 @@ def test_units_become_house_units_and_old_names_stay_valid(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("heading", "parts"),
     [
-        ("t1 [furlong]", ["'furlong' is no known unit", "known are degC, um", 'role = "ignore"']),
-        ("t1_furlong", ["'furlong' is no known unit", 'column = "t1_furlong"']),
-        ("t1_mym", ["'mym' is no known unit", "the nearest are", "um"]),
-        ("mains [Hz]", ["spindle_speed only by a mapping", 'role = "spindle_speed" and unit = "Hz"']),
-        ("coolant_in", ["displacement only by a mapping", 'role = "displacement" and unit = "in"']),
+        ("t1 [furlong]", ["'furlong' is not a known unit", "known units are degC, um", 'role = "ignore"']),
+        ("t1_furlong", ["'furlong' is not a known unit", 'column = "t1_furlong"']),
+        ("t1_mym", ["'mym' is not a known unit", "the nearest are", "um"]),
+        ("mains [Hz]", ["spindle_speed only with a mapping", 'role = "spindle_speed" and unit = "Hz"']),
+        ("coolant_in", ["displacement only with a mapping", 'role = "displacement" and unit = "in"']),
         ("load", ["has no unit", "append it to the name"]),
     ],
 )

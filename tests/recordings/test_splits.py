@@ -72,7 +72,7 @@ def test_short_cycles_are_left_out_together(recording: Recording) -> None:
     judging = splits.leave_one_cycle_out(samples)
     assert [s.block for s in judging.splits] == ["cycle 0 to 2", "cycle 3", "cycle 4 to 5"]
     assert [int(s.judge.sum()) for s in judging.splits] == [215, 285, 300]
-    assert judging.name == "leave one thermal cycle out (6 cycles, 3 of them too short: out with the one before)"
+    assert judging.name == "leave one thermal cycle out (6 cycles, 3 of them too short: left out with the previous one)"
     fitted = study.fit(samples, "ols", judging)
     (model,) = fitted.models
     assert model.honest_error is not None

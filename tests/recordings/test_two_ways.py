@@ -47,10 +47,22 @@ def told(recording: Recording, part: str) -> bool:
             ["01/12/2024 8:00", "02/01/2024 8:00"],
             "2024-01-12T08:00:00",
             1728000,
-            "otherwise time would not rise",
+            "otherwise time would not increase",
         ),
-        ("Date (DD-MM-YYYY)", ["03-04-2024 08:00:00", "03-04-2024 08:00:09"], "2024-04-03T08:00:00", 9, "heading says"),
-        ("Datum [TT/MM/JJJJ]", ["03/04/2024 08:00", "03/04/2024 08:01"], "2024-04-03T08:00:00", 60, "heading says"),
+        (
+            "Date (DD-MM-YYYY)",
+            ["03-04-2024 08:00:00", "03-04-2024 08:00:09"],
+            "2024-04-03T08:00:00",
+            9,
+            "heading specifies",
+        ),
+        (
+            "Datum [TT/MM/JJJJ]",
+            ["03/04/2024 08:00", "03/04/2024 08:01"],
+            "2024-04-03T08:00:00",
+            60,
+            "heading specifies",
+        ),
         ("Datum", ["06.05.24 08:00:00", "06.05.24 08:00:10"], "2024-05-06T08:00:00", 10, ""),
         ("Datum", ["27. Mai 2024 08:00", "27. Mai 2024 08:01"], "2024-05-27T08:00:00", 60, ""),
         ("Datum", ["27.Okt.2024 08:00:00", "27.Okt.2024 08:00:10"], "2024-10-27T08:00:00", 10, ""),
@@ -114,7 +126,7 @@ def test_an_hour_that_is_missing_at_the_change_to_summer_time_is_asked_for(tmp_p
 def test_a_time_of_day_goes_over_midnight(tmp_path: Path, clocks: list[str]) -> None:
     recording = read(table(tmp_path, "Zeit", clocks))
     assert recording.time.tolist() == [0, 10, 20, 30]
-    assert told(recording, "the time of day goes over midnight in line 4")
+    assert told(recording, "the time of day passes midnight in line 4")
 
 
 @pytest.mark.parametrize(
@@ -206,7 +218,7 @@ def test_a_point_is_the_decimal_sign_where_commas_separate_columns(tmp_path: Pat
 
 
 def test_thousands_with_and_without_separator_in_one_column_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"line 2 has '20.512' with a separator of thousands, line 3 has '1234,5'"):
+    with pytest.raises(InputError, match=r"line 2 has '20.512' with a thousands separator, line 3 has '1234,5'"):
         read(table(tmp_path, "time_s", ["0", "1"], ["20.512", "1234,5"]))
 
 
@@ -416,7 +428,7 @@ def test_a_clock_that_is_set_needs_its_zone(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="02:00:00 is before 2024-10-27 02:59:00"):
         read(autumn, utc)
     missing = stamps(tmp_path / "missing.csv", "2024-03-31 01:58:00", "2024-03-31 02:30:00")
-    with pytest.raises(RecordingError, match=r"these are not times in Europe/Berlin: .*02:30:00"):
+    with pytest.raises(RecordingError, match=r"these cannot be times in Europe/Berlin: .*02:30:00"):
         read(missing, berlin)
     with pytest.raises(InputError, match=r"\[time\]: zone = 'Europe/Berln' is not known"):
         Mapping(TimeColumn(zone="Europe/Berln"))

@@ -185,7 +185,7 @@ def test_dates_that_the_time_does_not_go_with_are_trouble(
 ) -> None:
     path = write(tmp_path, f"{headings},T1 [degC],Z [um]\n{rows()}")
     with pytest.raises(
-        TwoReadingsError, match=r"'Datum' says 2024-03-07 in line 22, which is not the day 3\.00 h after"
+        TwoReadingsError, match=r"'Datum' contains 2024-03-07 in line 22, which is not the day 3\.00 h after"
     ):
         read(path, check_content(keys, "m"))
     mapping = tmp_path / "mapping.toml"
@@ -202,7 +202,7 @@ def test_dates_that_the_time_does_not_go_with_are_trouble(
 def test_of_two_columns_of_dates_the_wrong_one_is_not_taken(tmp_path: Path) -> None:
     printed = rows("%H:%M:%S,2024-05-01,%Y-%m-%d")
     path = write(tmp_path, f"Time,Printed,Measured,T1 [degC],Z [um]\n{printed}")
-    with pytest.raises(TwoReadingsError, match="'Measured' says 2024-03-07 in line 22") as caught:
+    with pytest.raises(TwoReadingsError, match="'Measured' contains 2024-03-07 in line 22") as caught:
         read(path)
     is_whole(read(path, check_content(dict(caught.value.remedies[0]), "m")))
 
@@ -222,7 +222,7 @@ def test_a_mapping_that_leaves_the_dates_out_is_warned_of(tmp_path: Path) -> Non
     keys = {"time": {"column": "Uhrzeit"}, "columns": {"Datum": {"role": "ignore"}}}
     (warning,) = (f for f in check(read(path, check_content(keys, "m"))) if f.kind == "left out")
     assert warning.severity == "warning"
-    assert "'Datum' says 2024-03-07 in line 22" in warning.text
+    assert "'Datum' contains 2024-03-07 in line 22" in warning.text
 
 
 @pytest.mark.parametrize("heading", ["Elapsed", "Laufzeit", "Rel. time"])
@@ -253,7 +253,7 @@ def test_time_that_passed_under_another_name_is_asked_for(tmp_path: Path) -> Non
         with pytest.raises(InputError) as caught:
             read(path)
         if count == 100:
-            assert "time that passed, or a pause of a whole day?" in str(caught.value)
+            assert "is it an elapsed time, or was there a pause of a whole day?" in str(caught.value)
             remedy = check_content(dict(caught.value.remedies[0]), "m")
             assert read(path, remedy).time.tolist() == [600.0 * k for k in range(count)]
 

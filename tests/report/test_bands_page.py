@@ -77,7 +77,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     assert f"<td>{best.half_width:.2f}</td>" in page
     assert f"held {100 * best.coverage:.0f} % of the judged rows" in page
     assert "90 % band by assumption, 4 cycles: half-width at least" in page
-    assert "what the answer is made of" in page
+    assert "contributions to the prediction" in page
     model = train("averaged", samples, 0, np.ones(len(samples), np.bool_)).model
     assert isinstance(model, PacedDynamic)
     for g in gains(model, 60.0):

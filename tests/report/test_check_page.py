@@ -51,7 +51,7 @@ def test_findings_are_listed_and_marked_at_their_rows() -> None:
     assert [(f.channel, f.kind) for f in found[:3]] == [("z_um", "spike"), ("t3_C", "unit"), ("x_um", "step")]
     for number, f in enumerate(found, start=1):
         assert f'<span class="n {f.severity}">{number}</span> {f.severity}, {f.kind}' in page
-    assert "3 troubles: a model fitted to this would be wrong" in page
+    assert "3 serious problems: a model fitted to this recording would be wrong" in page
     for c in recording.channels:
         assert f'<td class="l">{c.name}</td>' in page
     # its number stands in the figure once, beside the axes' own; without the finding there is none

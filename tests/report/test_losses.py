@@ -33,7 +33,8 @@ def lines(model: ErrorModel, lost: dict[str, float]) -> str:
 def test_a_spare_is_recommended_where_what_stands_in_is_dear_or_nothing_does(model: ErrorModel) -> None:
     said = lines(model, {"t1_C": 2.1, "t2_C": 1.9, "t3_C": 6.5})
     assert (
-        "A spare sensor is recommended for t1_C, t3_C: without it a correction is held, or leaves over 2 times" in said
+        "A spare sensor is recommended for t1_C, t3_C: without it a correction is held, or its error is over 2 times"
+        in said
     )
     assert "without t3_C its correction is held" in said
 

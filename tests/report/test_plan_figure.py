@@ -43,7 +43,7 @@ def test_the_next_test_stands_in_its_gap(found: Plan) -> None:
     assert points(stops, "o") == pytest.approx(np.array([(v, s / 3600) for v, _, s in sorted(found.covered.runs)]))
     assert points(runs, "*") == points(stops, "*") == [(6000.0, 6.0)]
     assert points(room, "*") == []
-    (near,) = (p for p in runs.patches if p.get_label() == "counts as its speed")
+    (near,) = (p for p in runs.patches if p.get_label() == "treated as the same speed")
     ends = near.get_window_extent().transformed(runs.transData.inverted())
     assert (ends.x0, ends.x1) == pytest.approx((6000 - SAME * 6000, 6000 + SAME * 6000))
     assert not [v for v, _, _ in found.covered.runs if ends.x0 <= v <= ends.x1]  # it is a gap

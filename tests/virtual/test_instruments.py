@@ -87,7 +87,7 @@ def test_a_sensor_on_a_surface_feels_the_air() -> None:
 
 def test_only_a_calculation_looks_into_a_shaft() -> None:
     assert thermometer(CENTRE, "t3", "shaft", perfect=True, noise=None).reads == {"shaft": 1.0}
-    with pytest.raises(InputError, match="'shaft' is a rotation"):
+    with pytest.raises(InputError, match="'shaft' is on a rotating part"):
         thermometer(CENTRE, "t3", "shaft", perfect=False, noise=None)
 
 

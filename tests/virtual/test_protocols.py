@@ -187,7 +187,10 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             BODY + 'places = ["hosing"]',
             "key 'places' = ['hosing']: there is no place 'hosing'; the nearest are housing",
         ),
-        (BODY + 'places = ["shaft"]', "'shaft' is a rotation: it can only be calculated, with perfect = true"),
+        (
+            BODY + 'places = ["shaft"]',
+            "'shaft' is on a rotating part: its temperature can only be calculated, with perfect = true",
+        ),
         (BODY + 'probes = ["w"]', "key 'probes' = ['w']: there is no probe 'w'; there are x1"),
         (BODY + 'touch = {every = "0 s", points = {a = [0, 0, 0]}}', "[touch], key 'every' = '0 s': must be positive"),
         (BODY + 'touch = {every = "1 h", points = {a = [0, 0]}}', "[points], key 'a' = [0, 0]: has too few values"),

@@ -179,7 +179,7 @@ def test_settings_are_told_and_can_be_given(machine: list[Path], capsys: pytest.
     arguments = ["position", *map(str, machine), "--component", "EYY", "--model", "ols"]
     assert run(arguments) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "Chosen by the profiles: --slopes 1 --no-offset --reference-position 0" in said
+    assert "Determined from the profiles: --slopes 1 --no-offset --reference-position 0" in said
     assert run([*arguments, "--slopes", "1", "--no-offset", "--reference-position", "300"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "Chosen by" not in said

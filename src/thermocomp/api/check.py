@@ -35,7 +35,7 @@ class CheckedRecordings(Result, Paged):
 
     @property
     def trouble(self) -> bool:
-        """Whether a problem was found that would spoil a model."""
+        """Whether a problem was found that would impair a model."""
         return any(f.severity == "trouble" for found in self.findings for f in found)
 
     def to_dict(self) -> dict[str, Any]:

@@ -138,7 +138,7 @@ class Compared(Result, Paged):
         )
 
     def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
-        """Return a figure of the errors of all models; or, for a target and a model, its course over the unseen blocks.
+        """Return a figure of the errors of all models; or of the course of a model for a target over the unseen blocks.
 
         Parameters
         ----------

@@ -123,7 +123,7 @@ def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -
         if part.first and part.start:
             do += f", then {f'run at {part.speed:.0f} 1/min' if part.speed else 'stop the spindle'}"
         if trial.kind == "room" and part.first and part.start:
-            do = "write down all, then let the room change: heating, gates, night"
+            do = "write down all, then let the room temperature change: heating, doors, night"
         # the speed of a row is that of the preceding period
         sheet.writerow([f"{part.start / 60:g}", f"{before:g}", *[""] * len(names), do])
         before = part.speed
@@ -217,7 +217,7 @@ def _head(trial: Trial, dialect: Dialect, every: float) -> Iterator[str]:
         yield _comment("the temperature of the room has to change meanwhile", dialect)
     if every and dialect == "linuxcnc":
         yield "o<probe> sub"
-        yield _comment("fill in: approach, G38.2, write down, retract; as it is nothing moves", dialect)
+        yield _comment("fill in: approach, G38.2, write down, retract; as written, nothing moves", dialect)
         yield "o<probe> endsub"
     yield "G97"
     yield "M5"

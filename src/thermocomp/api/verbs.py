@@ -156,7 +156,7 @@ def compare(
 
 
 def _single(models: Any) -> bool:
-    """Return whether it is a single method: a forest of scikit-learn is iterable, too."""
+    """Return whether `models` is a single method: a forest of scikit-learn is iterable, too."""
     return isinstance(models, str) or hasattr(models, "fit")
 
 
@@ -228,7 +228,7 @@ def fit(
     >>> import thermocomp as tc
     >>> days = tc.simulate("wessel-milling")
     >>> fitted = tc.fit(days, "s1_um", "ols", leave_one="file")
-    >>> fitted.model.honest_error.word, f"{fitted.model.honest_error.rms:.1f} um"  # on days it had not seen
+    >>> fitted.model.honest_error.word, f"{fitted.model.honest_error.rms:.1f} um"  # on unseen days
     ('accepted', '8.5 um')
     >>> fitted.save("model.json").name
     'model.json'

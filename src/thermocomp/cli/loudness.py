@@ -21,7 +21,7 @@ quiet = verbose = False
 
 
 def taken_off(words: Sequence[str]) -> list[str]:
-    """Return a command line without the flags, at any position; they apply until the next call.
+    """Return a command line without the flags, wherever they are; they apply until the next call.
 
     Raises
     ------

@@ -108,7 +108,7 @@ def _ask(question: "Question") -> Remedy | None:
         _stderr.print(f"  [bold]{k}[/] {words(to_toml(option).replace(chr(10), '; '))}", soft_wrap=True)
     _stderr.print("  [bold]0[/] leave it as it is")
     own = next((name for name in question.options[0].get("columns", ())), "")
-    more = ', or keys of your own, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""
+    more = ', or custom keys, such as: role = "displacement", unit = "mm", scale = 0.0025' if own else ""
     best = "0" if question.severity in ("warning", "info") else "1" if question.may_guess else ""
     while True:
         _stderr.print(f"  number{more}{f' [{best}]' if best else ''}: ", end="", markup=False, soft_wrap=True)

@@ -80,24 +80,24 @@ def _show(found: Planned, files: list[Path]) -> None:
     columns = (
         Column("next test", lambda c: c.trial.words),
         Column("would gain", lambda c: c.gain, ".2f", "um"),
-        Column("expected error in it", lambda c: c.doubt, ".2f", "um"),
-        Column("what is new in it", lambda c: c.news),
+        Column("expected error in the test", lambda c: c.doubt, ".2f", "um"),
+        Column("new conditions", lambda c: c.news),
     )
     p = found.plan
     caption = (
         f"{p.hours:g} h each, speeds up to {p.top_speed:,.0f} 1/min; expected error over all of them {p.expected:.2f} "
-        "um now: of a calculation, not judged"
+        "um now: calculated, not judged"
     )
     print_table(Layout(columns, p.candidates, caption=caption), console)
     if found.curve is not None:
         levels = (
-            Column("cycles learned from", lambda x: x.learned, ">"),
+            Column("training cycles", lambda x: x.learned, ">"),
             Column("unseen RMS", lambda x: x.rms, ".2f", "um"),
             Column("+-", lambda x: x.error, ".2f", "um"),
         )
         none = f"mean over targets and unseen cycles; without compensation {found.curve.none:.2f} um"
         print_table(Layout(levels, found.curve.by_cycles(), caption=none), console)
-        speeds = (Column("speeds learned from", lambda x: x.learned, ">"), *levels[1:])
+        speeds = (Column("training speeds", lambda x: x.learned, ">"), *levels[1:])
         print_table(Layout(speeds, found.curve.by_speeds()), console)
     console.print(words(str(found)), soft_wrap=True)
     if files:

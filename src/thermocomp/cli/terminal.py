@@ -13,7 +13,7 @@ from thermocomp.report.layout import Item, Layout, Toned, verdict
 
 
 def make_console(**how: Any) -> Console:
-    """Return a console that does not alter text, such as emoji for ``:names:``, and executes no control codes.
+    """Return a console that prints text unaltered (no emoji for ``:names:``) and executes no control codes.
 
     Parameters
     ----------

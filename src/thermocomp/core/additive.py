@@ -76,7 +76,7 @@ class Additive(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""
         if self.response is not None and self.response.constant:
             return ()
         active = [v for v, c in zip(self.variables, self.curves, strict=True) if not c.constant]

@@ -5,7 +5,7 @@ The model's clock ticks every `interval`; readings may come at any time:
 - A reading represents the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input of
   a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is the
   reading itself.
-- Ticks are made when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
+- Ticks are computed when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
   equal, the rest of a gap is one matrix power (for a net, the loop ends once its output has settled).
 - Between two ticks the deviation is interpolated linearly from the last tick towards the next one, which is computed
   with the mean of the inputs since the last tick. The deviation is continuous in time, so that a reading at 14.9 s
@@ -103,7 +103,8 @@ class Ticking(ErrorModel):
         known = np.asarray(deviation, dtype=np.float64)
         if zero.shape != (len(self.inputs),) or given.shape[-1:] != zero.shape:
             raise InputError(
-                f"start of the model of {self.target}: expected {len(self.inputs)} inputs and as many references"
+                f"start of the model of {self.target}: expected {len(self.inputs)} inputs and {len(self.inputs)} "
+                "reference values"
             )
         if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
             raise InputError(
@@ -164,7 +165,7 @@ class Ticking(ErrorModel):
         return np.concatenate([clock, total, own, past], axis=-1), deviation
 
     def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Make one tick; return the past deviations and the inputs of the last m ticks, newest first."""
+        """Compute one tick; return the past deviations and the inputs of the last m ticks, newest first."""
         k, m = self.orders
         value = self._tick(np.concatenate([own[..., :k], mean, past], axis=-1))
         own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
@@ -260,7 +261,7 @@ class Autoregressive(Ticking):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""
         return tuple(x.name for x, b in zip(self.inputs, self.b, strict=True) if any(b))
 
     def coefficients_by_name(self) -> dict[str, float]:
@@ -339,7 +340,7 @@ class AutoregressiveNet(Ticking):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that influence the deviation through non-zero weights."""
+        """Names of the inputs that affect the deviation through non-zero weights."""
         out = np.array(self.net.output_weights[0]) != 0
         reached = (np.array(self.net.hidden_weights)[out] != 0).any(axis=0) & (np.array(self.input_scaling.gain) != 0)
         alive = reached[self.k :].reshape(self.m + 1, -1).any(axis=0) & (self.output_scaling.gain[0] != 0)

@@ -137,7 +137,7 @@ def check_count(owner: str, most: int, **entries: Sequence[object]) -> None:
 def check_name(what: str, name: str, most: int = NAME) -> None:
     """Reject an invalid name: empty, too long, or with characters that break a line or a terminal."""
     if not name.strip() or len(name) > most:
-        raise SettingError(f"{what}: a name has 1 to {most} characters, found {len(name.strip())}")
+        raise SettingError(f"{what}: expected a name of 1 to {most} characters, found {len(name.strip())}")
     for c in name:
         kind = unicodedata.category(c)
         if kind[0] == "C" or kind in ("Zl", "Zp"):

@@ -65,7 +65,7 @@ class Curve:
 
     @property
     def constant(self) -> bool:
-        """True if the variable has no influence."""
+        """True if the variable has no effect."""
         return min(self.y) == max(self.y)
 
     @property

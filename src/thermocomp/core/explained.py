@@ -21,7 +21,7 @@ _ANY = 60.0
 
 @dataclass(frozen=True)
 class SensorExplanation:
-    """An input of a model: its influence, how its failure is detected, and the response to it.
+    """An input of a model: its effect, the detection of its failure, and the response to a failure.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Explanation:
     remembers : bool
         The output depends on earlier readings.
     sensors : tuple of SensorExplanation
-        Inputs with an influence, by descending bound where it is known.
+        Inputs that affect the output, by descending bound where it is known.
     zero : str
         Reference of its inputs.
     word, reason : str
@@ -99,7 +99,8 @@ class Explanation:
     covered : str
         Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
-        Number of sensor pairs whose joint failure was judged, and of those with which the correction continues.
+        Number of sensor pairs whose joint failure was judged, and of those after whose failure the correction
+        continues.
     """
 
     target: str
@@ -205,7 +206,7 @@ def _spare(model: ErrorModel, name: str, seen: Watched | None) -> str:
     if not model.may_lose([name]):
         return "without it the correction is held, then fades"
     if model.widening([name]) > DEAR:
-        return f"its substitute value leaves {model.widening([name]):.1f} times the error"
+        return f"with its substitute value the error is {model.widening([name]):.1f} times as large"
     return f"its slow drift is detected only from {seen.off:.1f} degC on" if seen.off > FAR else ""
 
 
@@ -253,7 +254,7 @@ def _outside(model: ErrorModel) -> str:
     kept = f"inputs are clipped to their trained range, widened by {100 * support.margin:.0f} %"
     if support.policy == "clip":
         return kept
-    more = {"hold": "the last answer from inside is held", "fade": "the answer fades to zero"}[support.policy]
+    more = {"hold": "the last output from inside the range is held", "fade": "the output fades to zero"}[support.policy]
     together = ", also where the combination of inputs is unlike the training data" if model.joint else ""
     return f"{kept}, and {more}{together}"
 
@@ -322,7 +323,7 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
     lost = f"{s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
     parts = []
     if s.watched and s.off is not None and s.jump is not None and s.moved is not None and s.pace is not None:
-        shift = f" (a drift up to there shifts the answer by {s.undetected:.2f} {unit})" if s.undetected else ""
+        shift = f"  (a drift up to this limit shifts the output by {s.undetected:.2f} {unit})" if s.undetected else ""
         still = f" or for {_span(s.still)}" if s.still is not None else ""
         parts.append(
             f"jump over {s.jump:.1f} degC in {_span(s.pace)}; off by {s.off:.1f} degC{shift}; stuck while its "

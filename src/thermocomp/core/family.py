@@ -1,4 +1,4 @@
-"""What a family of models implements; all else is in `thermocomp.core.model.ErrorModel`."""
+"""Interface of a family of models; everything else is in `thermocomp.core.model.ErrorModel`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -45,4 +45,4 @@ class ModelFamily(ABC):
     @property
     @abstractmethod
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""

@@ -101,5 +101,5 @@ class Prints:
                 )
             if (rows := unpack_marks(run.rows)).size and rows[-1] >= ends[-1]:
                 raise SettingError(
-                    f"fingerprints: one begins at row {rows[-1]}, but only {ends[-1]} rows were recorded"
+                    f"fingerprints: a run begins at row {rows[-1]}, but only {ends[-1]} rows were recorded"
                 )

@@ -50,7 +50,9 @@ class Input:
         if self.quantity not in HOUSE_UNITS:
             raise explain_unknown("quantity", self.quantity, HOUSE_UNITS, ("quantity",))
         if self.unit != (house := HOUSE_UNITS[self.quantity]):
-            raise SettingError(f"input {self.name}: a {self.quantity} is in {house}, found {self.unit!r}", ("unit",))
+            raise SettingError(
+                f"input {self.name}: expected a {self.quantity} in {house}, found {self.unit!r}", ("unit",)
+            )
         check_finite(f"input {self.name}", RANGE, reference=self.reference, low=self.low, high=self.high)
         if not self.low <= self.high:
             raise SettingError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
@@ -63,7 +65,7 @@ class Support:
     Inputs are always clipped to the trained range widened by `margin`. In addition:
 
     - ``clip``: no further action; the deviation at the clipped inputs is returned,
-    - ``hold``: the last deviation from inside the range is returned until all inputs are back,
+    - ``hold``: the last deviation from inside the range is returned until all inputs are inside again,
     - ``fade``: the deviation is faded linearly to zero over `fade_over` beyond the range.
 
     With a `JointSupport`, a reading is also outside where the combination of its inputs is unlike the training data:

@@ -114,7 +114,7 @@ class LinearDynamic(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""
         active = {k for k, c in enumerate(self.direct) if c != 0}
         active |= {k for k, c in zip(self.lag_signals, self.lagged, strict=True) if c != 0}
         used = {i for k in active for i in self._table.inputs_of(k)}

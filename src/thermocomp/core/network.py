@@ -105,7 +105,9 @@ class Perceptron:
             raise SettingError(f"net: each of {n_outputs} outputs needs {n_hidden} weights, one per hidden node")
         for layer in (self.hidden, self.output):
             if layer not in _FUNCTIONS:
-                raise SettingError(f"net: unknown activation function {layer!r}; known are {', '.join(_FUNCTIONS)}")
+                raise SettingError(
+                    f"net: unknown activation function {layer!r}; expected one of {', '.join(_FUNCTIONS)}"
+                )
         check_count("net", NODES, hidden_nodes=self.hidden_thresholds, outputs=self.output_thresholds)
         if self.n_parameters > ENTRIES:
             raise SettingError(f"net: {self.n_parameters:,} weights and thresholds, at most {ENTRIES:,} are supported")
@@ -262,7 +264,7 @@ class Network(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that influence the deviation through non-zero weights."""
+        """Names of the inputs that affect the deviation through non-zero weights."""
         first, _, second, _ = self.net._arrays
         reached = (first != 0) & (second[:, 0] != 0)
         alive = reached.any(axis=1) & (np.array(self.input_scaling.gain) != 0) & (self.output_scaling.gain[0] != 0)

@@ -35,7 +35,7 @@ def find_place(target: Path) -> Path:
         raise cannot_be_written(target, e) from e
     folder = place.parent if target.is_symlink() else target.parent
     if not folder.is_dir():
-        raise InputError(f"{target}: there is no folder {folder}; make it first")
+        raise InputError(f"{target}: there is no folder {folder}; create it first")
     if place.is_dir():
         raise InputError(f"{target}: is a folder; name a file")
     if place.exists():

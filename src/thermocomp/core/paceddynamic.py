@@ -125,7 +125,9 @@ class PacedDynamic(ErrorModel):
         check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
         parts = len(temperatures) * (1 + len(self.time_constants)) + len(states)
         if any(len(row) != parts for row in self.spread):
-            raise SettingError(f"{owner}: expected {parts} numbers in each row of spread, one per part")
+            raise SettingError(
+                f"{owner}: expected {parts} numbers in each row of spread, one per temperature, lag and speed state"
+            )
         check_count(owner, ENTRIES, spread=[w for row in self.spread for w in row])
         check_between(owner, LEAST, RANGE, top_speed=self.top_speed)
         check_between(
@@ -207,7 +209,7 @@ class PacedDynamic(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""
         active = {t.input for t in self.temperatures if t.direct or any(t.lagged)}
         active |= {s.input for s in self.states if s.weight}
         return tuple(self.inputs[k].name for k in sorted(active))

@@ -85,7 +85,7 @@ class Polynomial(ErrorModel):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names of the inputs that have an influence on the deviation."""
+        """Names of the inputs that affect the deviation."""
         used = {i for k, c in enumerate(self.coefficients) if c != 0 for i in self._table.inputs_of(k)}
         return tuple(self.inputs[i].name for i in sorted(used))
 

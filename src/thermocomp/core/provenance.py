@@ -154,7 +154,7 @@ class HonestError:
         return f"{why}. Approved by {self.taken}" if self.taken else why
 
     def may_lose(self, names: Sequence[str]) -> bool:
-        """Return whether the model was judged without these inputs and then leaves less error than no compensation.
+        """Return whether the model was judged without these inputs, with a smaller error than without compensation.
 
         This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
         first one.

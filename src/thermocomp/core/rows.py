@@ -16,7 +16,7 @@ from thermocomp.core.zero import Zeroing, find_zero
 
 
 class Stepped(Protocol):
-    """What a replay needs of a model; see `thermocomp.core.model.ErrorModel`."""
+    """Interface of a model for a replay; see `thermocomp.core.model.ErrorModel`."""
 
     remembers: ClassVar[bool]
 

@@ -35,7 +35,7 @@ class StackState(NamedTuple):
 
 
 class Stack:
-    """Several models with one `init` and one `step`; each gives the same output as on its own, up to rounding.
+    """Several models with one `init` and one `step`; each gives the same output as alone, up to rounding.
 
     A `Polynomial` is a `LinearDynamic` without lags: models of the two families share one table of terms, one bank of
     lags and one readout, so that an input, variable or term used by several of them is evaluated once. `PacedDynamic`

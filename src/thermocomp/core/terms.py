@@ -58,7 +58,9 @@ class Variable:
         """Return the difference of two of the inputs `names`."""
         for name in (plus, minus):
             if name not in names:
-                raise InputError(f"difference {plus}-{minus}: no input is named {name!r}; there are {', '.join(names)}")
+                raise InputError(
+                    f"difference {plus}-{minus}: no input is named {name!r}; the inputs are {', '.join(names)}"
+                )
         return cls(f"{plus}-{minus}", ((names.index(plus), 1.0), (names.index(minus), -1.0)))
 
     def check_inputs(self, count: int) -> None:

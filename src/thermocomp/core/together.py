@@ -21,7 +21,7 @@ class TogetherState(NamedTuple):
 
 
 class Together:
-    """Models with the same inputs and states, each with a separate readout; each gives the same output as on its own.
+    """Models with the same inputs and states, each with a separate readout; each gives the same output as alone.
 
     Parameters
     ----------

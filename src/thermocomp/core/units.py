@@ -172,7 +172,7 @@ def find_unit(symbol: str, quantity: str | None = None) -> Unit:
         The unit is unknown, or belongs to another quantity.
     """
     if quantity is not None and quantity not in HOUSE_UNITS:
-        raise UnitError(f"unknown quantity {quantity!r}; known are {', '.join(HOUSE_UNITS)}")
+        raise UnitError(f"unknown quantity {quantity!r}; expected one of {', '.join(HOUSE_UNITS)}")
     name = _name(symbol)
     counted = _COUNT.fullmatch(name)
     if counted is not None:

@@ -113,7 +113,7 @@ class Watch:
             raise SettingError("watch: the input of a speed state must be a spindle speed")
         parts = len(heat) * (1 + len(self.time_constants)) + len(self.states)
         if any(len(s.weights) != parts for s in self.sensors):
-            raise SettingError(f"watch: expected {parts} weights per sensor, one per part")
+            raise SettingError(f"watch: expected {parts} weights per sensor, one per temperature, lag and speed state")
         lagged = len(heat) * (1 + len(self.time_constants))
         if any(any(s.weights[k : lagged : len(heat)]) for k, s in enumerate(self.sensors)):
             raise SettingError("watch: a temperature must not be predicted from itself")

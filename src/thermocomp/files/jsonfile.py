@@ -60,7 +60,10 @@ def pack(kind: Format, body: list[Any], shared: dict[str, Any] | None = None) ->
     content = {"format": kind.name, "version": kind.version, "sha256": digest(body, shared), "models": body, **shared}
     text = _lay_out(content) + "\n"
     if len(text) > MOST:
-        raise InputError(f"{kind.words}: {len(text):,} characters, more than the limit of {MOST:,} for reading it back")
+        raise InputError(
+            f"{kind.words}: {len(text):,} characters, but at most {MOST:,} can be read back; write the models to "
+            "separate files"
+        )
     return text
 
 
@@ -87,7 +90,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
     try:
         found_digest = digest(body, {k: content[k] for k in kind.shared if k in content})
     except (ValueError, RecursionError) as e:  # 1e999, half a surrogate pair, a hundred brackets
-        raise ModelFileError(f"{source}: not a {kind.words}: holds what no {kind.words} can: {_short(str(e))}") from e
+        raise ModelFileError(f"{source}: not a {kind.words}: invalid content: {_short(str(e))}") from e
     if content.get("sha256") != found_digest:
         raise ModelFileError(
             f"{source}: its numbers do not match its checksum: the file was altered or damaged; write it again with "
@@ -150,7 +153,7 @@ def digest(body: list[Any], shared: dict[str, Any] | None = None) -> str:
 def _parse(text: str, no: str, source: str, command: str) -> Any:
     for sign, most in _COUNTS.items():
         if text.count(sign) > most:
-            raise ModelFileError(f"{no}: {sign} appears in it more than {most:,} times")
+            raise ModelFileError(f"{no}: it contains {sign} more than {most:,} times")
     try:
         return json.loads(text, object_pairs_hook=_table, parse_constant=_refuse, parse_int=_whole)
     except RecursionError as e:
@@ -160,7 +163,7 @@ def _parse(text: str, no: str, source: str, command: str) -> Any:
             raise ModelFileError(f"{no}: {_found(text)}; name the file that '{command}' wrote") from e
         where = f"line {e.lineno}, column {e.colno}"
         if e.pos >= len(text.rstrip()) - 1 or "Unterminated" in e.msg:
-            raise ModelFileError(f"{source}: the file ends in the middle ({where}); copy it again, completely") from e
+            raise ModelFileError(f"{source}: the file is incomplete (it ends at {where}); copy it again") from e
         raise ModelFileError(f"{no}: {e.msg} at {where}") from e
     except ValueError as e:
         raise ModelFileError(f"{no}: {e}") from e
@@ -214,8 +217,8 @@ def _check_kind(kind: Format, content: Any, source: str) -> None:
         raise ModelFileError(f"{source}: {kind.words} without a version; write it again with '{kind.command}'")
     if version > kind.version:
         raise ModelFileError(
-            f"{source}: written by a newer thermocomp, version {version} of a {kind.words}; this one reads version "
-            f"{kind.version}: update"
+            f"{source}: written by a newer thermocomp, version {version} of a {kind.words}; this thermocomp reads "
+            f"version {kind.version}: update it"
         )
 
 
@@ -232,7 +235,7 @@ def _tell(error: ErrorDetails, content: Any) -> str:
             keys += cause.path if isinstance(cause, SettingError) else ()
         case "union_tag_invalid":
             kind, known = (context[k].replace("'", "") for k in ("discriminator", "expected_tags"))
-            message = f"unknown {kind} {_short(context['tag'])}; known are {known}"
+            message = f"unknown {kind} {_short(context['tag'])}; expected one of {known}"
         case "union_tag_not_found":
             message = f"has no {context['discriminator']}"
         case "unexpected_keyword_argument" | "extra_forbidden":

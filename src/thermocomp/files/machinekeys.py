@@ -156,9 +156,9 @@ COUNTED_FROM = {
     "spindle": ("measured_tool",),
 }
 PLACES = {
-    "measured_at": "where X, Y and Z stood while it was measured",
-    "measured_tool": "the way from the gauge point to where the translations were measured",
-    "reference_position": "the position at which it moves nothing",
+    "measured_at": "the positions of X, Y and Z while it was measured",
+    "measured_tool": "the vector from the gauge point to the point where the translations were measured",
+    "reference_position": "the position at which it causes no displacement",
 }
 COMPONENT: dict[str, Convert] = {"model": _text, "target": _text, "profile": _rows}
 MACHINE: dict[str, Convert] = {

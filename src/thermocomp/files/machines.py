@@ -261,7 +261,7 @@ class _Sources:
                 if part.honest_error is not None:  # a model that was never judged is shown as such and never runs
                     part.check_may_run()
             except InputError as e:
-                raise SettingError(f"{path}: {e}; fit a better one, or leave {component.code} out", here) from e
+                raise SettingError(f"{path}: {e}; fit a better model, or leave {component.code} out", here) from e
         return model
 
 

@@ -24,7 +24,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     for n, line in enumerate(text.splitlines(), start=1):
         parts = () if line.lstrip().startswith("#") else re.split(r"[,\[\]{}]", line)
         if any(part.count(".") > DOTS for part in parts):
-            raise InputError(f"{source}: line {n}: a key of more than {DOTS} parts")
+            raise InputError(f"{source}: line {n}: a key with more than {DOTS} parts; shorten it")
     try:
         content = tomllib.loads(text)
         if _depth(content) > DEPTH:

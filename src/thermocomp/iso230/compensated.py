@@ -51,7 +51,7 @@ def replay_models(
         alone = samples.deviations[own, 0] - ran.deviation
         left = [float(np.sqrt(np.nanmean(v**2))) for v in (found[target], alone)]
         if f"{left[0]:.2f}" != f"{left[1]:.2f}":
-            notes.append(f"{target}: the model alone leaves {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
+            notes.append(f"{target}: residual of the model alone {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
         known = find_learned_rows(model, samples)[own]
         if known.all():
             notes.append(f"the model of {target} was fitted to this recording: its residual is not an honest test")
@@ -68,7 +68,7 @@ def replay_models(
             notes.append(f"the model of {target}: {share} are outside its trained range")
     if models and not found:
         raise InputError(
-            f"{recording.name}: the models are of {', '.join(m.target for m in models)}, but the recording has no such "
-            "channel"
+            f"{recording.name}: the models predict {', '.join(m.target for m in models)}, but the recording has no "
+            "such channel"
         )
     return found, notes

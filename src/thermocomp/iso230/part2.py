@@ -28,7 +28,7 @@ TARGETS, TARGETS_PER_METRE, RUNS = 5, 5.0, 5
 #: travel above which an axis is long: one run in each direction; mean interval of its targets [mm]
 LONG, LONG_INTERVAL = 2000.0, 250.0
 #: note required in every report of these values
-UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires it stated with these values."
+UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires it to be stated with these values."
 
 
 @dataclass(frozen=True, eq=False)

@@ -146,7 +146,7 @@ class _Stretch(NamedTuple):
 
     @property
     def part(self) -> slice:
-        """Its rows, including those before it."""
+        """Rows of the test, including the preceding rows that define its initial state."""
         return slice(self.rows[0] - self.lead, self.rows[2] + 1)
 
     def curve(self, label: str, unit: str, place: str, measured: FloatArray, left: FloatArray | None) -> ThermalCurve:
@@ -252,7 +252,7 @@ def _about_curves(kind: Kind, curves: Sequence[ThermalCurve], targets: Sequence[
     for c in (*curves, *(c for t in targets for c in t.curves)):
         if c.after_figures is not None and c.after_figures.range_all > c.figures.range_all:
             grown = f"{c.figures.range_all:.3g} to {c.after_figures.range_all:.3g} {c.unit}"
-            notes.append(f"{c.name}: with the model its range grows, from {grown}")
+            notes.append(f"{c.name}: with the model its range increases, from {grown}")
     return notes
 
 
@@ -275,7 +275,7 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     if stations := find_stations(recording):
         notes.append(_stations_words(stations))
     if air is None:
-        notes.append("no temperature is known to be that of the surroundings: name its channel (ambient)")
+        notes.append("no ambient temperature was identified: name its channel (ambient)")
     if kind == "axis" and not _target_groups(recording):
         notes.append(
             "no channel is a target position of an axis: name the channels by axis and position, such as x_laser_0, "
@@ -346,7 +346,7 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
 
 
 def _load(recording: Recording, kind: Kind, start: int, stop: int) -> str:
-    """Return the load of the spindle or the axis during running, as text."""
+    """Return the load of the spindle or the axis while it runs, as text."""
     if kind == "etve":
         return "machine at rest" if recording.of_quantity("spindle_speed") else "regarded as at rest"
     quantity, word = ("spindle_speed", "spindle at") if kind == "spindle" else ("feed", "feed of")

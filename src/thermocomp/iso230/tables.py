@@ -12,11 +12,11 @@ from thermocomp.judging.choice import Cell, Table
 from thermocomp.judging.settling.settling import Settling
 
 _CAPTION_60 = "Counted from the start of the test; rows averaged over {minutes:.3g} min."
-_CAPTION_U = " ±: expanded uncertainty (k = 2) by the noise, its serial correlation within that time minded."
+_CAPTION_U = " ±: expanded uncertainty (k = 2) due to noise, including its serial correlation within that time."
 _WORDS = {
     ">": "; > where the curve has not settled: it is later",
-    "still": "; still: its averages do not move beyond their noise",
-    "faint": "; faint: it moves, but too little above its noise for a time",
+    "still": "; still: its averages do not change by more than their noise",
+    "faint": "; faint: it changes, but too little above its noise to determine a time",
     "returns": "; returns: it comes back before",
     "peaks": "; peaks: it overshoots its last value, then settles back",
 }
@@ -132,12 +132,12 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
         title = f"Time constants: {phase.kind}{f' {phase.number}' if several else ''} [min]"
         columns = ("", "change", "t63", "t90", "tau", "R2", "fast", "slow", "R2 of both")
         caption = (
-            "change, t63, t90: read from the averaged curve; ±: expanded uncertainty (k = 2) by the noise; > where it "
-            "has not settled at the end; still: its averages do not move beyond their noise; faint: it moves, but too "
-            "little above its noise for a time; returns: it comes back before the end; peaks: it overshoots its last "
-            "value, then settles back. tau: of one exponential, fast and slow: of two, where they are called "
-            "for; each with its standard error, in brackets if it is longer than the phase or less sure than half of "
-            "itself."
+            "change, t63, t90: read from the averaged curve; ±: expanded uncertainty (k = 2) due to noise; > where it "
+            "has not settled at the end; still: its averages do not change by more than their noise; faint: it "
+            "changes, but too little above its noise to determine a time; returns: it comes back before the end; "
+            "peaks: it overshoots its last value, then settles back. tau: of one exponential, fast and slow: of two, "
+            "where two are justified; each with its standard error, in brackets if it is longer than the phase or its "
+            "standard error exceeds half of it."
         )
         tables.append(Table(title=title, columns=columns, rows=rows, caption=caption))
     return tuple(tables)

@@ -95,9 +95,9 @@ class Figures:
     range_last : float
         Largest minus smallest value over the last 60 min of running; nan if the drives run for less than 2 h.
     range_rows : float
-        `range_all` of the single rows, including their noise.
+        `range_all` of the rows without averaging, including their noise.
     U_60, U_end, U_cool_down : float
-        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` by the noise, including that of the zero;
+        Expanded uncertainties (k = 2) of `at_60`, `at_end` and `cool_down` due to noise, including that of the zero;
         nan if unknown.
     """
 
@@ -182,10 +182,9 @@ class ThermalTest:
     Parameters
     ----------
     recording : Recording
-        Recording of which it is a part.
+        Recording that contains the test.
     start, stop, end : int
-        First row, to which all values are relative; row of the stop of the drives (`end` if they do not stop); last
-        row.
+        First row, to which all values are relative; row in which the drives stop (`end` if they do not); last row.
     load : str
         Load of the spindle or the axis, as text.
     curves : tuple of ThermalCurve

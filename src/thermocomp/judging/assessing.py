@@ -39,7 +39,7 @@ class Judged:
     assessments : tuple of Assessment
         Per model and cycle, and per model over all cycles.
     seen : tuple of str
-        Names of recordings to which a model was fitted unchanged: not judged on if there are others.
+        Names of recordings that were used, unchanged, to fit a model; it is judged on the other ones, if there are any.
     validity : Validity or None
         Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
@@ -82,7 +82,7 @@ def assess(
     if probings and (unknown := [m.target for m in models if m.honest_error is None]):
         raise InputError(
             f"model of {', '.join(unknown)} was never judged on unseen cycles, so the weight of a probing relative to "
-            "the model is not known; 'thermocomp fit' judges the models that it fits"
+            "the model is not known; fit the model with 'thermocomp fit', which also judges it"
         )
     found: list[Assessment] = []
     covered = None
@@ -223,7 +223,7 @@ def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: 
 
 
 def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
-    """Return whether the judged rows continue the training data, so that their level is that of the training part."""
+    """Return whether the judged rows continue the training data, and so start at the level of the training data."""
     judged = np.unique(samples.test[~known & np.isfinite(samples.deviations[:, 0])])
     earlier = {r.fingerprint for k in judged for r in (samples.starts[k].earlier if samples.starts else ())}
     return bool(np.isin(samples.test[known], judged).any() or not earlier.isdisjoint(_hashes(model)))

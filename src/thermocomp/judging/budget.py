@@ -110,19 +110,19 @@ class Budget:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Numbers of sensors of the sets."""
+        """Number of sensors in each set."""
         return tuple(len(s) for s in self.sensors)
 
     def enough(self, model: str) -> int | None:
         """Return the smallest number of sensors whose mean RMS over the blocks is within `margin` of the smallest.
 
-        None if the model could not be fitted in one of the blocks, or no number is better than no compensation.
+        None if the model could not be fitted in one of the blocks, or no set is better than no compensation.
         """
         found = self._fewest([self.models.index(model)])
         return None if found is None else self.sizes[found[1]]
 
     def recommended(self) -> tuple[str, int] | None:
-        """Return the model, and the index in `sensors`, with the smallest sufficient number of sensors of all models.
+        """Return the model that needs the fewest sensors, and the index of their set in `sensors`.
 
         A set is not better than no compensation, and so not sufficient, if its mean gain over the blocks is less than
         the minimum gain of a sensor, or at most one standard error of this gain between the blocks.
@@ -136,7 +136,7 @@ class Budget:
         return None if found is None else (self.models[found[0]], found[1])
 
     def margin(self) -> tuple[float, float, float] | None:
-        """Return the tolerated excess of the mean RMS over the smallest one, and its origin [`unit`].
+        """Return the tolerated excess of the mean RMS over the smallest one, and the two values behind it [`unit`].
 
         The larger of one standard error of the smallest mean between the blocks (Breiman 1984, Classification and
         Regression Trees, section 3.4.3) and `WORTH`, the latter at most `SHARE` of the error without compensation.

@@ -38,15 +38,15 @@ class Candidates:
         temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
         name = samples.targets[target].name
         if not temperatures:
-            raise InputError(f"{name}: there is no temperature to select from")
+            raise InputError(f"{name}: the inputs contain no temperature; sensors are selected among temperatures")
         rows = samples.valid & np.isfinite(samples.deviations[:, target])
         if rows.sum() < 3:
             raise FitError(f"{name}: {int(rows.sum())} complete rows; at least 3 are needed for selecting sensors")
         if np.ptp(samples.deviations[rows, target]) == 0:
-            raise FitError(f"{name} does not change: sensors cannot be selected by it")
+            raise FitError(f"{name} is constant; name a target that changes")
         X = samples.frame().iloc[rows, temperatures].reset_index(drop=True)
         if not (np.ptp(X.to_numpy(), axis=0) > 0).any():
-            raise FitError(f"{name}: no temperature changes: there is nothing to select from")
+            raise FitError(f"{name}: all temperatures are constant; give recordings in which they change")
         return cls(name, X, samples.deviations[rows, target], samples.cycle[rows])
 
     @property

@@ -25,10 +25,10 @@ LOOKED_AT_BY = {
 
 
 class Progress(Protocol):
-    """Receiver of progress."""
+    """Callback that receives the progress."""
 
     def __call__(self, text: str, /, steps: int = 1) -> None:
-        """Receive a line of text, and the number of tasks completed with it."""
+        """Receive a line of text, and the number of tasks completed since the last call."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,11 +1,11 @@
-"""Conditions covered by the judged units, and their similarity: the conditions for which an honest error is valid.
+"""Conditions covered by the judged units, for which an honest error is valid, and the similarity of these units.
 
 Similarity: each unit's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts of
 its duration. The squared distance of two units is the mean square difference over these parts, summed over the inputs
 of a quantity and divided by their summed variance over all judged rows, averaged over the quantities; plus the squared
-logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor makes
-no two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program on a
-similar day, adds no information. Alike units count once (single linkage).
+logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor does
+not make two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program
+on a similar day, adds no information. Alike units count once (single linkage).
 """
 
 from collections.abc import Sequence
@@ -123,18 +123,20 @@ def table(named: dict[str, Validity]) -> Table:
     """Return the covered conditions as a short table: one column per judging scheme."""
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
-    caption = f"Alike: inputs less than {ALIKE:g} of their spread apart all the way; copies count once."
-    return Table(title="What the judged units covered", columns=("", *named), rows=tuple(rows), caption=caption)
+    caption = f"Alike: inputs that differ by less than {ALIKE:g} of their spread throughout; copies count once."
+    return Table(
+        title="Conditions covered by the judged units", columns=("", *named), rows=tuple(rows), caption=caption
+    )
 
 
 def _cells(v: Validity) -> dict[str, str]:
     days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
     return {
         "units judged": f"{v.units}, {v.independent} of them distinct" if v.units > 1 else f"{v.units}",
-        "two most similar": "" if v.nearest is None else f"{v.nearest:.2f} of the inputs' spread apart",
+        "two most similar": "" if v.nearest is None else f"differ by {v.nearest:.2f} of the inputs' spread",
         "hours, days": f"{v.hours:.1f} h{days}",
         "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
-        "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not named",
+        "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not specified",
         "mean temperature at the start [degC]": _range(v.start) if v.start else "",
     }
 

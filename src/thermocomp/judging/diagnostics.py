@@ -55,8 +55,8 @@ class Diagnosis:
     Parameters
     ----------
     spectrum : Spectrum
-        Eigenvalues of X'X without the column of ones, as in Table 3, with the smallest, the sum of inverses and the
-        condition number (H-14 to H-16, E-H6).
+        Eigenvalues of X'X without the column of ones, as in Table 3, with the smallest one, the sum of their inverses
+        and the condition number (H-14 to H-16, E-H6).
     vif : tuple of float
         Variance inflation factor of each variable; nan for a constant one.
     contributions : tuple of float

@@ -30,7 +30,7 @@ LEVEL = 0.05
 #: baselines for comparison
 BASELINES = ("no compensation", "the learned mean", "the last learned value")
 #: fourth baseline for a single continuous block: without model, both relative to the mean of the block's first rows
-NAMES = (*BASELINES, "none, both re-zeroed where the block begins")
+NAMES = (*BASELINES, "none, both re-zeroed at the start of the block")
 REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
@@ -51,7 +51,7 @@ class JudgedUnit:
     rms, largest : float
         RMS and largest absolute value of the residual [um].
     baselines : tuple of float
-        RMS left by each of `BASELINES` [um].
+        Residual RMS of each of `BASELINES` [um].
     none_largest : float
         Largest deviation without compensation [um].
     noise : float
@@ -115,7 +115,7 @@ class Verdict:
     p : float or None
         P-value of the test, corrected for the number of methods; None: computed from the units.
     about : str
-        Reason why it is not corrected for this number; empty if it is.
+        Reason why the p-value is not corrected for the number of methods; empty if it is.
     names : tuple of str
         Names of the baselines.
     stated : float or None
@@ -245,7 +245,7 @@ class Verdict:
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
-        """Return the sufficient number of units of this kind; None if it exceeds 50."""
+        """Return the number of units of this kind that would suffice for acceptance; None if it exceeds 50."""
         ratios = np.array([u.log_ratios[self.worst] for u in self.units])
         effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
         for n in range(len(ratios) + 1, 51):
@@ -316,7 +316,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the tolerated degradation in a single unit by default [unit]."""
+    """Return the default of the tolerated degradation in a single unit [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 

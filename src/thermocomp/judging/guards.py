@@ -19,12 +19,12 @@ FEW = 6
 
 @dataclass(frozen=True)
 class Guard:
-    """Readings that a watch passes while sensors read their zero from the start on (C-34).
+    """Readings that a watch passes while sensors read their zero from the start of each test (C-34).
 
     Parameters
     ----------
     readings : dict of (tuple of str) to dict of int to ndarray of shape (n_rows,)
-        By failed sensors: columns of the samples in which the passed readings differ from the recorded ones.
+        By failed sensors, then by column of the samples: the passed readings, if any differs from the recorded ones.
     """
 
     watch: Watch
@@ -37,7 +37,7 @@ class Guard:
 
 
 def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | None:
-    """Return the readings that a watch passes while each temperature, or each pair of few temperatures, fails.
+    """Return the readings that a watch passes while each temperature, or with few temperatures each pair, fails.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
 
 
 def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
-    """Return the readings that a given watch passes while each temperature, or each pair of few, fails.
+    """Return the readings that a given watch passes while each temperature, or with few temperatures each pair, fails.
 
     Parameters
     ----------

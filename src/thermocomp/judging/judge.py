@@ -44,10 +44,10 @@ def judge(
     widening: FloatArray | None = None,
     watched: Collection[str] = (),
 ) -> Assessment:
-    """Judge a frozen model on a block by the residual of a compensator with it.
+    """Judge a frozen model on a block by the residual of a compensator that runs it.
 
-    The verdict is based, in each judged part, on the worse of the compensator and the model alone: a model does not
-    pass because limits clip its output.
+    The verdict is based, in each judged part, on the worse of the compensator and the model alone: no model is
+    accepted merely because limits clip its output.
 
     Parameters
     ----------
@@ -140,14 +140,14 @@ def _verdict(
 
 
 def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return the worse result of a unit, compensator or model alone, so that limits cannot make a model pass."""
+    """Return the worse result in a unit, of compensator or model alone: no model is accepted because of limits."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
 def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return the cap that the units are too alike to count separately; empty if they are not."""
+    """Return a cap if the units are too alike to count separately; empty if they are not."""
     covered = find_validity(samples, judging)
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:
@@ -160,7 +160,7 @@ def _caps(
 ) -> tuple[str, ...]:
     """Return the reasons that prevent acceptance of a model, whatever its errors.
 
-    Faults of monitored temperatures (`watched`) are no reason: they are judged with the replacement values.
+    Faults of monitored temperatures (`watched`) do not count: the model is judged with the replacement values.
     """
     others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]

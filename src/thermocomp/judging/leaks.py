@@ -37,7 +37,7 @@ def find_learned_rows(model: ErrorModel, samples: Samples) -> BoolArray:
 
 
 def refuse_leaks(samples: Samples, judging: Judging) -> None:
-    """Reject rows that occur twice in the data if one of them is used for training and the other for judging."""
+    """Reject data in which a row occurs twice, if one copy is used for training and the other for judging."""
     for target in range(len(samples.targets)):
         source = repeats(samples, target)
         copies = np.flatnonzero(source >= 0)

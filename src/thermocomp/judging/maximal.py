@@ -54,12 +54,14 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
     chosen = max(small, key=lambda s: total[s])
     notes = list(dict.fromkeys(n.partition(": ")[2] for n in same.notes))
     number = enough or f"more than {settings.most('ace')}"
-    notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement takes {number} sensor(s), no more are chosen.")
-    notes.append("Psi is a fit within each cycle, not an error on unseen ones: judge the set with 'compare --inputs'.")
+    notes.append(f"A mean Psi of {ENOUGH_PSI:g} for every displacement needs {number} sensor(s); no more are selected.")
+    notes.append(
+        "Psi measures the fit within each cycle, not the error on unseen cycles: judge the set with 'compare --inputs'."
+    )
     if not same.common:
         notes.append("No set is as good as the best for all displacements: the one shown is the best for one of them.")
     if not psi.complete:
-        notes.append(f"Stopped: {int(done.sum())} of {len(sets)} thermal cycles were done.")
+        notes.append(f"Stopped: {int(done.sum())} of {len(sets)} thermal cycles were completed.")
     return Choice(
         method="ace",
         target=", ".join(targets),

@@ -92,6 +92,6 @@ def bias(measured: FloatArray, predicted: FloatArray) -> float:
 
 @metric(best="high", unit="%")
 def reduction(measured: FloatArray, predicted: FloatArray) -> float:
-    """Percent by which the RMS falls below that of no compensation; negative means harm."""
+    """Reduction of the RMS relative to no compensation, in percent; negative means harm."""
     none = rms(measured, np.zeros_like(measured))
     return 100.0 * (1.0 - rms(measured, predicted) / none) if none > 0 else float("-inf")

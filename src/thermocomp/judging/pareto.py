@@ -80,13 +80,13 @@ def _advice(found: Budget, model: str, place: int) -> list[str]:
     """Return the advantages and drawbacks of the recommended sensors."""
     left = found.of_targets()[found.models.index(model), place]
     idle = [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]
-    none_better = f"These sensors are no better than no compensation for {', '.join(idle)}: choose for it by itself."
+    none_better = f"These sensors are no better than no compensation for {', '.join(idle)}: select for it separately."
     return [
         *([none_better] if idle else []),
         next_to_buy(found, model, place),
-        "Sensors of each number are those whose loss `averaged` feels least when they are made up from the others, "
-        "the same for all displacements, whatever model is then trained on them. Their number was chosen by the errors "
-        "shown, so they flatter it a little.",
+        "In each set are the sensors from which the others can be predicted with the smallest change of the output of "
+        "`averaged`; the sets are the same for all displacements and models. The number of sensors was chosen by the "
+        "errors shown, so these are slightly optimistic.",
     ]
 
 
@@ -114,12 +114,12 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
     headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
     return Table(
         title=f"Error on unseen blocks: {judging.name}",
-        columns=("sensors", *headings, f"next gains [{found.unit}]", "condition", "chosen in all rows"),
+        columns=("sensors", *headings, f"next gains [{found.unit}]", "condition", "selected on all rows"),
         rows=rows,
         marked=place,
         caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; "
-        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: what {model} gains by the sensors of "
-        "the next row. Enough, each model by itself: "
+        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: gain of {model} with the sensors of "
+        "the next row. Sufficient number, for each model: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
     )
@@ -138,9 +138,9 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
         columns=("sensors", *(f"{t} mean RMS" for t in found.targets)),
         rows=rows,
         marked=1 + place,
-        caption="In the unit of each; 0 sensors: without compensation."
+        caption="Each in its own unit; 0 sensors: without compensation."
         + (
-            f" {found.targets[worst]} is hit most: {more[worst]:.2f} {found.unit} more than with all."
+            f" {found.targets[worst]} is affected most: {more[worst]:.2f} {found.unit} more than with all sensors."
             if place + 1 < len(errors)
             else ""
         ),
@@ -152,20 +152,20 @@ def _next(found: Budget, model: str, place: int) -> Table:
     gains, blocks = found.gains(model)
     unit = found.unit
     return Table(
-        title="What to buy next",
+        title="Next sensor to buy",
         columns=("sensors", "next", f"gains [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
         rows=tuple(
             (found.sizes[k], _joins(found, k), float(gains[k]), float(blocks[k].min()), float(blocks[k].max()))
             for k in range(len(gains))
         ),
         marked=place if place < len(gains) else None,
-        caption=f"By {model}; below zero it is worse with the sensor than without it. "
-        "In each block the sensors are those that were chosen without it.",
+        caption=f"With {model}; below zero the error is larger with the sensor than without it. "
+        "In each block the sensors are those that were selected without this block.",
     )
 
 
 def _joins(found: Budget, place: int) -> str:
-    """Return the name of the sensor that joins next; for the step from the largest set to all, their number."""
+    """Return the name of the sensor added next; for the step from the largest set to all, the number added."""
     new = [s for s in found.sensors[place + 1] if s not in found.sensors[place]]
     return new[0] if len(new) == 1 else f"all {len(new)} others"
 
@@ -176,18 +176,20 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
     assert margins is not None
     margin, _, least = margins
     if place == len(found.sensors) - 1:
-        return "Next to buy: all temperatures are in use, of others nothing is known."
+        return "Next to buy: all temperatures are in use; the gain of others is unknown."
     gains, blocks = found.gains(model)
     own, unit = blocks[place], found.unit
     spread = f" ({own.min():.2f} to {own.max():.2f} {unit} from block to block)" if len(own) > 1 else ""
     would = f"{_joins(found, place)} would gain {gains[place]:.2f} {unit}{spread}"
-    none = f"{would}; {least:.2f} {unit} is what a further sensor has to gain."
+    none = f"{would}; a further sensor must gain at least {least:.2f} {unit}."
     # if a single sensor gains too little, several may gain enough
     for k, gain in enumerate(np.cumsum(gains[place:]).tolist(), start=place + 1):
         new = [s for s in found.sensors[k] if s not in found.sensors[place]]
         if gain > len(new) * least:
             surely = (
-                "." if gain > margin else ", which is less than the blocks differ by: more thermal cycles would decide."
+                "."
+                if gain > margin
+                else ", less than the differences between the blocks: more thermal cycles would decide."
             )
             if k == place + 1:
                 return f"Next to buy: {would}{surely}"
@@ -201,14 +203,14 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
 def _frequency(found: Budget, place: int) -> Table:
     order = np.argsort(-found.frequency[place], kind="stable")
     return Table(
-        title=f"How surely a sensor is among the best {len(found.sensors[place])}",
+        title=f"Selection frequency: sensor among the best {len(found.sensors[place])}",
         columns=("sensor", "share of the blocks [%]"),
         rows=tuple(
             (found.candidates[j], float(100 * found.frequency[place, j]))
             for j in order
             if found.frequency[place, j] > 0
         ),
-        caption="Chosen again without each block: a sensor far below 100 % was a matter of luck.",
+        caption="Selected again without each block: a sensor far below 100 % was selected by chance.",
     )
 
 
@@ -235,21 +237,21 @@ def _stand_ins(found: Budget, place: int) -> Table:
         for j, name in enumerate(names)
     )
     return Table(
-        title="What stands in for what",
+        title="Virtual sensors",
         columns=(
             "sensor",
             "nearest other",
             "its miss [degC]",
-            "of the chosen",
+            "from the selected",
             "their miss [degC]",
-            f"loses [{found.unit}]",
+            f"loss [{found.unit}]",
         ),
         rows=rows,
-        caption="Each is made up from the one other that misses it least, and from the chosen sensors "
-        f"(a chosen one from the others of them, as if it failed), with {found.answer.noise:g} degC of noise in use. "
-        "Miss: RMS of what is left of it. Loses: what the answer of `averaged` with all temperatures changes by if "
-        f"this one alone is made up from the chosen{_mean(found)}. Those with less than {100 * PART:g} % part in it "
-        "are not named.",
+        caption="Each temperature is predicted from the single other one that predicts it best, and from the selected "
+        f"sensors (a selected one from the other selected ones, as if it failed), with {found.answer.noise:g} degC of "
+        "noise in use. Miss: RMS of the prediction error. Loss: change of the output of `averaged` with all "
+        f"temperatures if only this one is predicted from the selected sensors{_mean(found)}. Sensors with a share "
+        f"below {100 * PART:g} % are not named.",
     )
 
 
@@ -267,7 +269,7 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
 
 
 def trade_off(found: Budget, model: str, place: int) -> str:
-    """Return the loss of accuracy due to fewer sensors than those of the best set, and than all sensors."""
+    """Return the loss of accuracy with fewer sensors, compared with the best set and with all sensors."""
     mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
     best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)
@@ -281,7 +283,11 @@ def trade_off(found: Budget, model: str, place: int) -> str:
             other = f"{found.sizes[j]}{by}" if j != place else f"as many{by}"
             said.append(f"{abs(cost):.2g} {found.unit} {'more' if cost >= 0 else 'less'} than {other}{what}")
     if not said:
-        return "fewer cost more than the rule allows" if n > 1 else "there is no other set to choose from"
+        return (
+            "with fewer sensors the error exceeds the margin of the rule"
+            if n > 1
+            else "there is no other set to choose from"
+        )
     return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)}"
 
 
@@ -290,12 +296,12 @@ def _rule(found: Budget) -> str:
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins
-    what = "what a further sensor has to gain to be worth it"
+    what = "the minimum gain of a further sensor"
     if found.unit == PERCENT or least < WORTH:
-        what = f"{100 * SHARE:g} % of what there is without compensation, {what}"
+        what = f"{100 * SHARE:g} % of the error without compensation, {what}"
     unit = found.unit
     return (
-        "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks, that "
-        f"of the table, is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
+        "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks "
+        f"(see the table) is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
         f"blocks (Breiman 1984), {error:.2f} {unit}, and of {least:.2f} {unit}, {what}."
     )

@@ -20,7 +20,7 @@ elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None]
 
 
 def return_reason(_piece: Any, why: str) -> Any:
-    """Return the reason of a failure in place of the result."""
+    """Return the reason for a failure in place of the result."""
     return why
 
 
@@ -33,13 +33,13 @@ def work_through(
 ) -> Iterator[_Found]:
     """Yield the results of the tasks, in their order.
 
-    A process that dies loses the results of other tasks, too, and the cause is unknown: missing tasks are repeated one
-    by one until the task that kills its process is found.
+    When a process dies, results of other tasks are lost as well, and the task that caused it is unknown: missing tasks
+    are repeated one by one until the task that kills its process is found.
 
     Parameters
     ----------
     failed : callable
-        Called with a task and the reason of its failure; returns the replacement of the result. Default: the reason.
+        Called with a task and the reason for its failure; returns a substitute for the result. Default: the reason.
     """
     if (share := elsewhere.get()) is not None:
         yield from share(work, pieces, failed)
@@ -69,7 +69,7 @@ def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_
 
 
 def explain(error: BaseException) -> str:
-    """Return the reason of a failure in one line; for foreign exceptions, including the type."""
+    """Return the reason for a failure in one line; with the type of exceptions that are not of thermocomp."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

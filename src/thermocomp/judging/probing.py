@@ -87,7 +87,7 @@ class Probings:
         time : ndarray of shape (n_rows,)
             In ascending order [s].
         usable : ndarray of bool of shape (n_rows,)
-            Rows with a value to be probed; the first is the start.
+            Rows with a deviation that can be probed; the first one is the start.
 
         Returns
         -------

@@ -1,7 +1,7 @@
-"""Recommended method: chosen inside the training part of every left-out unit, so that the choice itself is judged.
+"""Recommended method: chosen anew without each unit in turn, so that the choice itself is judged.
 
 The error of a choice among methods is not the error of the method with the best result: the best of twenty is partly
-luck. Therefore the choice is repeated for every left-out unit, by the error on units left out of the rest (nested
+luck. Therefore the choice is repeated for every left-out unit, by the error on units left out of the others (nested
 cross-validation, Varma and Simon 2006), and the method chosen is judged on the left-out unit.
 """
 
@@ -29,7 +29,7 @@ class Inner:
     Parameters
     ----------
     split : Split
-        Its `judge` has all units left out: an outer unit, and the inner unit or units.
+        Its `judge` marks all rows that are left out: those of the outer unit and of the inner unit or units.
     scores : tuple of (int, int)
         (outer left-out unit, inner unit) pairs for which it gives an error.
     """
@@ -39,7 +39,7 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the inner splits needed for a choice inside each unit's training part."""
+    """Return the inner splits needed to choose a method without each unit."""
     splits = judging.splits
     n = len(splits)
     if n < LEAST:

@@ -59,4 +59,4 @@ def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
 
 def describe_method(name: str) -> str:
     """Return a sentence that describes a method."""
-    return METHODS[name].summary if name in METHODS else "an estimator that was handed in"
+    return METHODS[name].summary if name in METHODS else "an estimator supplied by the user"

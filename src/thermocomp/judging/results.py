@@ -29,7 +29,7 @@ class Rules:
     margin : float or None
         Tolerated degradation in a single unit [unit of the target]; None: by `do_no_harm.margin_of`.
     primary : str or None
-        Method under test: not corrected for the number of methods, unlike all others.
+        Method under test: unlike all others, its verdict is not corrected for the number of methods.
     """
 
     margin: float | None = None
@@ -60,7 +60,7 @@ class Assessment:
     verdict : Verdict
         Verdict of the do-no-harm gate.
     sensors : tuple of str
-        Inputs with an influence; if several models were trained, those of all models.
+        Inputs that affect the result; if several models were trained, those of all models.
     fit_s : float
         Total duration of the fits [s].
     n_effective : float
@@ -74,9 +74,9 @@ class Assessment:
     overall : bool
         True for the final result of this model and target, over all judged data instead of one cycle.
     n_sensors : tuple of (int, int)
-        Smallest and largest number of inputs with an influence in one model.
+        Smallest and largest number of inputs that affect the result of one model.
     learned : int
-        Number of rows used for training the model: left out, unless there are no others (see `caveat`).
+        Number of rows used for training the model: not judged, unless there are no others (see `caveat`).
     alone : ndarray of shape (n_judged,), optional
         Prediction of the model alone, without gate and limits; `predicted` is the output with them [um].
     limits : Limits or None

@@ -27,7 +27,7 @@ class Robustness:
     noise_rms : dict of str to tuple of float
         Mean and largest RMS over the draws, per noise distribution [um].
     lost_rms : dict of str to float
-        RMS with one sensor cut off [um].
+        RMS with one sensor lost [um].
     outside : float
         Fraction of rows with an input outside the trained range.
     outside_rms : float
@@ -40,7 +40,7 @@ class Robustness:
     unlike_rms : float
         RMS in these rows [um]; nan without any.
     together_rms : dict of str to float
-        RMS with several sensors cut off at once (``t1_C, t2_C``); used only to decide whether the model may then run
+        RMS with several sensors lost at once (``t1_C, t2_C``); used only to decide whether the model may then run
         [um].
     """
 
@@ -58,7 +58,7 @@ class Robustness:
     def worse_than_none(self) -> tuple[str, ...]:
         """Disturbances under which the error of the model exceeds that without compensation, so that it does harm.
 
-        Such as ``noise of 0.4 degC`` (the mean over the draws of one of its distributions) and ``loss of t3_C``.
+        Examples: ``noise of 0.4 degC`` (the mean over the draws of one of its distributions) and ``loss of t3_C``.
         """
         return tuple(self._above(self.none_rms))
 
@@ -68,7 +68,7 @@ class Robustness:
         return self.harm_beyond(0.0)
 
     def harm_beyond(self, margin: float) -> str:
-        """Return the disturbances that make it worse than no compensation by more than a margin [um], as text."""
+        """Return the disturbances that make a model worse than no compensation by more than a margin [um], as text."""
         told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
         more = f" and {len(told) - 4} more" if len(told) > 4 else ""
         return (
@@ -89,7 +89,7 @@ class Robustness:
 
 
 def worse(one: Robustness, other: Robustness) -> Robustness:
-    """Return `one`, with the worse results of both for noise and lost sensors."""
+    """Return `one`, with the worse result of `one` and `other` for noise and each lost sensor."""
     noise = {
         law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
         for law, (mean, largest) in one.noise_rms.items()
@@ -102,7 +102,7 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
 
 
 def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
-    """Pool the results of several blocks, each with its number of rows; None if a block has no result.
+    """Pool the results of several blocks, weighted by their numbers of rows; None if a block has no result.
 
     RMS values are pooled as the root of the mean square; for the largest over the draws, the maximum is used.
     """
@@ -166,7 +166,7 @@ def stress(
 
     - Noise on every temperature, independent from row to row (C-33). The paper states an amplitude but no distribution
       (E-C9), so both are drawn: uniform within +-`NOISE`, and normal with `NOISE` as standard deviation.
-    - Each sensor cut off: its change reads zero from the start on (C-34), the worst kind of failure. With a guard, a
+    - Each sensor lost: its change reads zero from the start (C-34), the worst kind of failure. With a guard, a
       watch may detect it; without, it goes undetected.
 
     Parameters

@@ -102,7 +102,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
     own = [next(i for i in g if i in found.representatives_) for g in found.groups_]
     groups = Table(
         f"Groups of correlation above {settings.threshold:g}",
-        ("group", "sensors", "representative", "takes part"),
+        ("group", "sensors", "representative", "used"),
         tuple(
             (k, " ".join(candidates.called(g)), candidates.names[r], "yes" if taking[g] else "")
             for k, (g, r) in enumerate(zip(found.groups_, own, strict=True), start=1)
@@ -142,7 +142,7 @@ def _other_thresholds(candidates: Candidates, found: CorrelationGrouping, settin
         for _, part in groupby(swept, lambda s: (len(s.interval.groups), s.choice.selected if s.choice else s.failure))
     ]
     return Table(
-        "What other thresholds give",
+        "Results with other thresholds",
         ("from", "to below", "groups", "sensors", "MSE_p [um^2]", "sum 1/eigenvalue [1/degC^2]"),
         tuple(
             (
@@ -190,7 +190,7 @@ def _by_steps(candidates: Candidates, method: str) -> Choice:
 
 
 def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progress: Progress) -> Choice:
-    """Select the exact best subset of every size (H-05), and a size."""
+    """Find the exact best subset of every size (H-05), and choose a size."""
     most = min(settings.most("subsets"), len(candidates.names))
     found = BestSubset(
         criterion=settings.criterion,
@@ -200,7 +200,13 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
         progress=partial(progress, steps=0),
     )
     found.fit(candidates.X, candidates.y, cycle=candidates.cycle)
-    headings = {"mse": "MSE_p [um^2]", "adjr2": "adjusted R2", "cp": "Cp", "bic": "BIC", "cycles": "RMS left out [um]"}
+    headings = {
+        "mse": "MSE_p [um^2]",
+        "adjr2": "adjusted R2",
+        "cp": "Cp",
+        "bic": "BIC",
+        "cycles": "RMS on left-out cycles [um]",
+    }
     shown = [k for k in headings if k in found.scores_]
     best = found.subsets_.best
     table = Table(
@@ -216,15 +222,18 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
             for row, s in enumerate(best)
         ),
         marked=next((row for row, s in enumerate(best) if s.columns == found.selected_), None),
-        caption=f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were looked at"
+        caption=f"{found.subsets_.nodes} of {found.subsets_.possible:.3g} sets were examined"
         + ("; the others cannot be better." if found.subsets_.proven else "."),
     )
     notes = _dependence(found.n_effective_, len(candidates.y))
     if found.subsets_.stopped:
-        notes = (f"The search was stopped ({found.subsets_.stopped}): what is not proven may not be the best.", *notes)
+        notes = (
+            f"The search was stopped ({found.subsets_.stopped}): sets that are not proven may not be the best.",
+            *notes,
+        )
     if found.subsets_.left_out:
         left = ", ".join(candidates.called(found.subsets_.left_out))
-        notes = (f"Constant, or a copy of another: {left} had no part in it.", *notes)
+        notes = (f"Not used: {left} (constant, or a copy of another sensor).", *notes)
     sensors = candidates.called(found.selected_)
     what = found.chosen_by_ or headings[found.criterion_]
     return Choice(
@@ -241,6 +250,6 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
 
 def _dependence(effective: float, rows: int) -> tuple[str, ...]:
     return (
-        f"The {rows} rows of this time series are worth about {effective:.0f} independent ones: criteria that take "
-        "rows as independent choose too many sensors. See --method pareto for the error on unseen cycles.",
+        f"The effective sample size of the {rows} rows of this time series is about {effective:.0f}: criteria that "
+        "treat rows as independent select too many sensors. See --method pareto for the error on unseen cycles.",
     )

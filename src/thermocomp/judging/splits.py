@@ -63,7 +63,7 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
     n = len(own)
     ends = [*own.tolist(), len(samples)]
     first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
-    name = f"first {train:.0%} of the rows to learn, next {test:.0%} unseen"
+    name = f"first {train:.0%} of the rows for training, next {test:.0%} unseen"
     return _consecutive(name, len(samples), first, stop)
 
 
@@ -87,12 +87,12 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
             f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last only {elapsed[-1] / 3600:.2f} h in "
             "all"
         )
-    name = f"first {train_s / 3600:g} h to learn, next {test_s / 3600:g} h unseen"
+    name = f"first {train_s / 3600:g} h for training, next {test_s / 3600:g} h unseen"
     return _consecutive(name, len(samples), first, stop)
 
 
 def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) -> list[IntArray]:
-    """Return the thermal cycles for judging: cycles that are too short are joined to the previous one of their test.
+    """Return the thermal cycles for judging: cycles that are too short are joined to the previous cycle.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
             "column or several files; or judge by time with --split 0.75/0.25"
         )
     blocks = join_short_cycles(samples.cycle, samples.test)
-    joined = f", {n - len(blocks)} of them too short: out with the one before" if 1 < len(blocks) < n else ""
+    joined = f", {n - len(blocks)} of them too short: left out with the previous one" if 1 < len(blocks) < n else ""
     if len(blocks) == 1:  # all cycles joined: no training data would be left
         blocks = [np.array([k]) for k in range(n)]
     splits = []
@@ -143,7 +143,7 @@ def leave_one_file_out(samples: Samples) -> Judging:
     """Judge on each file in turn, train on all others; each file is judged as one unit."""
     n = len(samples.test_names)
     if n < 2:
-        raise InputError("leaving one file out needs at least two recordings")
+        raise InputError("leaving one file out needs at least two recordings, found one")
     splits = [
         Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
     ]

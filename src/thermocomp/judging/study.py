@@ -61,7 +61,7 @@ def fit(
     """Judge a method on unseen blocks, then fit it to all rows."""
     (method,) = expand([method])
     if not deployable(method):
-        raise InputError(f"{method} cannot be stored as coefficients: judge it with 'compare', fit another method")
+        raise InputError(f"{method} cannot be stored as coefficients: judge it with 'compare', or fit another method")
     everything = np.ones(len(samples), dtype=np.bool_)
     written = [train(method, samples, k, everything, support=support, prints=True) for k in range(len(samples.targets))]
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]

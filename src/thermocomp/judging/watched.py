@@ -21,7 +21,8 @@ def believe(
 ) -> tuple[Samples, FloatArray]:
     """Return samples as passed by a model's watch, and the widening of its band, in the tests of `rows`.
 
-    Both are unchanged without a watch, or without the speeds it needs. Rows without a speed are passed on unchanged.
+    The samples are unchanged, and nothing is widened, without a watch, or without the speeds that the watch needs. Rows
+    without a speed are passed on unchanged.
 
     Parameters
     ----------

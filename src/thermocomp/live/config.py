@@ -167,15 +167,15 @@ class Config:
         """Yield the settings that are missing or exclude each other."""
         if bool(self.models) == bool(self.machine):
             yield (
-                f"models = {list(self.models)}: name at least one model file, as 'thermocomp fit' writes it, or a "
-                "[machine], and not both"
+                f"models = {list(self.models)}: name at least one model file written by 'thermocomp fit', or a "
+                "[machine], but not both"
             )
         if not self.sources:
             yield 'no source: add a table [[sources]] with kind = "mqtt", "simulated" or "replay"'
         if self.own_compensation == "on" and not self.shadow:
             yield (
-                'own_compensation = "on": the same error would be corrected twice; switch off that of the controller, '
-                "or let the models run in shadow (shadow = true)"
+                'own_compensation = "on": the same error would be corrected twice; switch off the compensation of the '
+                "controller, or let the models run in shadow (shadow = true)"
             )
         controlled = any(isinstance(s, LinuxCncOut) for s in self.sinks)
         if self.own_compensation == "unknown" and (self.journal or self.probes or controlled):
@@ -241,7 +241,7 @@ def read_config(path: str | Path) -> ServiceSettings:
     """Read a configuration."""
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
-        raise InputError("\n".join([f"{path}: {len(unfit)} to correct:", *(f"  {line}" for line in unfit)]))
+        raise InputError(_list(path, unfit))
     adapter = _adapter(content)
     try:
         config = adapter.validate_json(as_json(content))
@@ -250,8 +250,14 @@ def read_config(path: str | Path) -> ServiceSettings:
         lines = [
             line for error in [*errors, *_behind(adapter, content, errors)] for line in _tell(dict(error)).splitlines()
         ]
-        raise InputError("\n".join([f"{path}: {len(lines)} to correct:", *(f"  {line}" for line in lines)])) from e
+        raise InputError(_list(path, lines)) from e
     return ServiceSettings(config, Path(path).resolve().parent)
+
+
+def _list(path: str | Path, errors: Sequence[str]) -> str:
+    """Return the errors of a configuration as text, one per line."""
+    found = f"{len(errors)} error{'' if len(errors) == 1 else 's'} to correct"
+    return "\n".join([f"{path}: {found}:", *(f"  {line}" for line in errors)])
 
 
 def _adapter(content: dict[str, Any]) -> TypeAdapter[Config]:
@@ -293,7 +299,7 @@ def _unfit(value: Any, place: str = "") -> Iterator[str]:
 def _behind(
     adapter: TypeAdapter[Config], content: dict[str, Any], errors: Sequence[ErrorDetails]
 ) -> list[ErrorDetails]:
-    """Return further errors in tables that have a key of a wrong type: such tables are not fully validated."""
+    """Return further errors in tables that have a value of a wrong type: such tables are not fully validated."""
     content = deepcopy(content)
     tables = set[tuple[int | str, ...]]()
     for error in errors:

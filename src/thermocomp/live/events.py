@@ -38,7 +38,7 @@ class Events(deque[Event]):
         self._left_out = dict.fromkeys(LIMITED, 0)
 
     def tell(self, time_of_it: float, kind: str, text: str) -> Event | None:
-        """Add an event and return it; None if the limit of its kind is exceeded: the next states the number omitted.
+        """Add an event and return it; None if too many of its kind: the next one states the number omitted.
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
 
 
 def find_faults_now(settings: ServiceSettings, page: Page | None) -> Iterator[str]:
-    """Yield other present faults that would prevent the start of the service or the operation of a link."""
+    """Yield other faults found now that would prevent the start of the service or the operation of a link."""
     config, folder = settings
     for source in config.sources:
         if isinstance(source, ReplayIn) and not _unreadable(folder / source.file, recording=True):
@@ -113,7 +113,7 @@ def _unwritable(path: Path) -> str:
 
 
 def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
-    """Yield the faults of a LinuxCNC setup."""
+    """Yield the faults in the setup of LinuxCNC."""
     hal = socket.with_name(HAL_NAME)
     do = "run 'thermocomp linuxcnc setup': its output names the socket to which the service connects"
     if socket.exists() and not socket.is_socket():

@@ -37,11 +37,11 @@ class ConfirmedCorrections:
         return found if self._clock.tick() - at <= CONFIRM_WITHIN * self._clock.speed else None
 
     def new_alarms(self, sink: Suspending) -> Iterator[str]:
-        """Yield changed alarms of corrections in force that differ from their demand."""
+        """Yield changes of alarms: a correction in force that differs from the commanded one, or no longer does."""
         alarms = dict(sink.alarms())
         for target in alarms.keys() | self._alarms.keys():
             if alarms.get(target) != self._alarms.get(target):
-                yield f"{target}: {alarms.get(target, 'is in force as it shall be again')}"
+                yield f"{target}: {alarms.get(target, 'the correction is in force again as commanded')}"
         self._alarms = alarms
 
 

@@ -26,7 +26,7 @@ class Latest(dict[str, tuple[float, float]]):
         return len(self._left_out)
 
     def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Store values; return the first name that was not kept, if none was before.
+        """Store values; return the first name that was not kept, if all names were kept until then.
 
         Parameters
         ----------

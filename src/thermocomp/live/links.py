@@ -63,7 +63,7 @@ class Link:
             self._wait = min(2 * self._wait, LONGEST)
 
     def status(self) -> LinkStatus:
-        """Return the status; the reason of a loss is kept until connected again."""
+        """Return the status; the reason for a loss is kept until the link is connected again."""
         if self.trouble:
             return LinkStatus("failed", self.trouble)
         try:
@@ -98,7 +98,7 @@ class Inlet(Link):
     Parameters
     ----------
     said : callable
-        Returns its readings or measurements.
+        Returns the readings or measurements of the source or probe.
     take : callable
         Called with each of them.
     """

@@ -90,7 +90,7 @@ class Recorder:
         self._references = dict(references)
 
     def confirm(self, time: float, in_force: Mapping[str, Correction]) -> None:
-        """Write the correction in force as reported by a controller."""
+        """Write the corrections in force, as reported by a controller."""
         for target, correction in in_force.items():
             self.journal.add(ConfirmationRow(time, target, correction))
 
@@ -109,7 +109,7 @@ class Recorder:
         self.journal.add(row)
 
     def update(self, checked: Checked, after: float) -> None:
-        """Write the change by a probing; `after` is the resulting addition to the deviation [um]."""
+        """Write the change of a model by a probing; `after` is the prediction after it [um]."""
         measured = checked.predicted + checked.residual
         if math.isfinite(measured):
             self.journal.add(

@@ -61,7 +61,7 @@ def fingerprint(compensator: Compensator) -> str:
 def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
     """Return the text of a state file."""
     if written.tzinfo is None:
-        raise InputError(f"state of a compensator: {written} has no time zone")
+        raise InputError(f"state of a compensator: the time of writing {written} has no time zone")
     entry = {
         "written": written.astimezone(UTC).isoformat(),
         "models": fingerprint(compensator),
@@ -110,7 +110,7 @@ def is_ours(path: Path) -> bool:
 
 
 def _check(state: CompensatorState, compensator: Compensator) -> None:
-    """Raise `ValueError` unless `state` is a possible state of this compensator."""
+    """Raise `ValueError` unless `state` is a valid state of this compensator."""
     cold, lines = compensator.start(), compensator.lines
     want(
         list(state.corrections) == list(lines),
@@ -156,7 +156,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
             learned.most > 0.0 and 0.0 < learned.usual <= 100.0,
             None,
             place,
-            "positive bounds of what a probing may change",
+            "positive bounds of the effect of a probing",
         )
         models = compensator.models[lines[target].models]
         known = {1, 1 + len(getattr(models[0], "spread", ()))} if len(models) == 1 else {1}
@@ -164,7 +164,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
 
 
 def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> None:
-    """Raise `ValueError` unless `seen` is a possible state of a watch that begins with `first`."""
+    """Raise `ValueError` unless `seen` is a valid state of a watch with the initial state `first`."""
     for name, value in seen._asdict().items():
         if isinstance(value, np.ndarray):
             # fields used in predictions are always numbers; instants may be unknown

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
@@ -19,7 +20,7 @@ _NOTHING = Curve((), (0.0,), "step")
 
 @dataclass(frozen=True)
 class SampledFunction:
-    """A function of one variable as points, for plots.
+    """A function of one variable, sampled for plots.
 
     Parameters
     ----------
@@ -131,8 +132,8 @@ class ACE(TransformRegressor):
         N: the boxcar contains 2N + 1 ranks (W-04). With n rows, N is limited to (n - 1) / 4, so that the window covers
         at most half of the data, but N is at least 1.
     window_share : float, optional
-        N as a share of the number of rows, instead of `half_window`: ten ranks are many for 199 rows, but capture only
-        noise in 10,000 (E-W8).
+        N as a share of the number of rows, instead of `half_window`: ten ranks are a wide window in 199 rows, but
+        follow only noise in 10,000 (E-W8).
     neighbours : int
         k of the nearest-neighbour estimate of phi and of theta^-1 (W-05). With fewer rows, all are used.
     tolerance : float
@@ -142,17 +143,17 @@ class ACE(TransformRegressor):
     max_sweeps : int
         Maximum number of sweeps. The paper's rule may need thousands: see ``errors_``.
     converged : bool
-        Iterate to convergence, with acceleration. The paper's boxcar has no limit when more than five inputs increase
-        together: its equations become singular and the sweeps diverge, so the paper's rule stops after a few. It is
-        replaced by a boxcar of half the width, applied twice, mirrored at the ends, and averaged over ties before and
-        after: symmetric, with eigenvalues from 0 to 1.
+        Iterate to convergence, with acceleration. With the paper's boxcar the sweeps have no limit when more than five
+        inputs increase together: the equations become singular and the sweeps diverge, so the paper's rule stops after
+        a few. Here the boxcar is replaced by one of half the width, applied twice, mirrored at the ends, and averaged
+        over ties before and after: this operator is symmetric, with eigenvalues from 0 to 1.
 
     Attributes
     ----------
     psi_, theta_, phi_, sum_phi_, errors_, falling_theta_, data_min_, data_max_
         See `TransformRegressor`.
     half_window_ : int
-        N as used.
+        N used in the fit.
 
     References
     ----------
@@ -223,7 +224,7 @@ def half_window(n_rows: int, fixed: int, share: float | None) -> int:
     else:
         if not 0 < share <= 0.25:
             raise InputError(
-                f"window_share {share}: expected more than 0 and at most 0.25, a window of half of the rows"
+                f"window_share {share}: expected more than 0 and at most 0.25 (a window of half of the rows)"
             )
         wanted = round(share * n_rows)
     return max(1, min(wanted, (n_rows - 1) // 4))

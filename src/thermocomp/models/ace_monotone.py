@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import isotonic_regression
 
-from thermocomp.core.additive import Curve
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.ace import TransformRegressor
 from thermocomp.models.base import FloatArray
@@ -16,7 +16,7 @@ _SAME = 1e-9  # relative variation below which a channel counts as constant: no 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class MonotoneACE(TransformRegressor):
-    """Alternating conditional expectations with an increasing theta, converged, as smooth curves (E-W5, E-W8).
+    """Converged alternating conditional expectations with an increasing theta and smooth curves (E-W5, E-W8).
 
     The model of `thermocomp.models.ace.ACE`, adapted to unseen cycles and to controllers:
 
@@ -27,7 +27,8 @@ class MonotoneACE(TransformRegressor):
       back-fitting takes thousands of sweeps, cost nothing extra.
     - theta is made increasing in every sweep (isotonic regression of its knots), so its inverse is unique. Where theta
       is flat, the inverse has a single point: the mean of y there.
-    - The curves continue straight outside the trained range for a share of its span and are constant beyond that.
+    - Outside the trained range the curves continue as straight lines over a share of its span; beyond that they are
+      constant.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ class MonotoneACE(TransformRegressor):
     max_sweeps : int
         Maximum number of sweeps.
     max_rows : int
-        With more rows than this, groups of consecutive rows of equal size are averaged first to stay within the limit.
+        With more rows than this, equally sized groups of consecutive rows are averaged first to stay within the limit.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Thinning of the tables of `ace`: one step per row and input makes 8 MB for 9,000 rows.
+"""Thinning of the tables of `ace`: one step per row and input would take 8 MB for 9,000 rows.
 
 The transformations of the inputs become piecewise linear and stay close to the value of each row. The inverse of theta,
 which jumps from row to row by more than the tolerance, becomes a step function of the new sum of each row instead of
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from thermocomp.core.additive import Curve
+from thermocomp.core.curves import Curve
 from thermocomp.models.base import FloatArray
 
 #: permissible change of the prediction for a fitted row [unit of the target], and the same as a share of the span
@@ -56,7 +56,7 @@ def sum_curves(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatA
 
 
 def _joined(curve: Curve, x: FloatArray, near: float) -> Curve:
-    """Return a piecewise linear curve with long segments in which no point deviates by more than `near`."""
+    """Return a piecewise linear curve with few segments that deviates from no point by more than `near`."""
     y = curve(x)
     kept, at = [0], 0
     xs, ys = x.tolist(), y.tolist()

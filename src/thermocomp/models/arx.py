@@ -22,7 +22,7 @@ from thermocomp.models.timed import Time
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """Candidates to try: data on one clock, orders to choose from, with or without intercept."""
+    """Candidates to try: data at one interval, orders to choose from, with or without intercept."""
 
     data: Clocked
     ks: tuple[int, ...]
@@ -34,7 +34,7 @@ class _Setting:
 class ARX(ClockedRegressor):
     """Autoregressive model with inputs: dz(t) = sum_{i=1..k} a_i dz(t - ih) + sum_{i=0..m} b_i n(t - ih) (P-01).
 
-    The recording is resampled to a clock of `interval`: the input at each tick is the mean of the inputs over the
+    The recording is resampled to ticks at a fixed `interval`: the input at each tick is the mean of the inputs over the
     interval that ends there, and the displacement is interpolated at the tick (see `thermocomp.core.autoregressive`).
 
     With ``criterion`` ``"fpe"``, ``"aic"`` or ``"bic"`` the coefficients come from least squares on one-step errors,
@@ -48,8 +48,8 @@ class ARX(ClockedRegressor):
     others, or are always zero, get no coefficient. Raises `FitError` if there is no input, if there are too few rows,
     or if the free run with the requested orders does not decay.
 
-    With ``time="none"`` every row is a machine at rest: only k = m = 0 can be learned, and `predict` returns the
-    deviation at which the model settles.
+    With ``time="none"`` every row is treated as a steady state: only k = m = 0 can be learned, and `predict` returns
+    the deviation at which the model settles.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class ARX(ClockedRegressor):
     orders_ : tuple of Order
         Table of FPE, AIC and BIC at `interval_`; empty with ``"free-run"``.
     trials_ : tuple of TriedSetting
-        Settings assessed in free run on left-out cycles; empty if there was no choice.
+        Settings assessed in free run on left-out cycles; empty if there was nothing to choose.
     cv_rms_ : float
         RMS of the chosen setting; nan if none was assessed.
     chosen_by_ : str
-        Kind of units that were left out.
+        Description of the cross-validation folds.
     one_step_rms_, free_run_rms_ : float
         Errors on the training data [unit of y]; the first is trivially small, the second is that of the model in use.
     caution_ : str
@@ -208,7 +208,7 @@ class ARX(ClockedRegressor):
             raise FitError(
                 f"k = {', '.join(map(str, ks))} at an interval of {data.interval:g} s: the largest root is "
                 f"{min(o.largest_root for o in found):.6g}, so the free run does not decay within the data; use "
-                "another interval, leave the order to be chosen, or let criterion free-run find the coefficients"
+                "another interval, omit k and m so that they are chosen, or set criterion='free-run'"
             )
         k, m = chosen.k, chosen.m
         weights, intercept = orders.coefficients(tri, [*range(k), *range(K, K + (m + 1) * J)])

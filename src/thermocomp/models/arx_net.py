@@ -76,7 +76,7 @@ class NetARX(ClockedRegressor):
     Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end: it
     cannot diverge. Raises `FitError` if there is no input or too few rows.
 
-    With ``time="none"`` every row is a machine at rest in that state, and the net is trained with k = m = 0.
+    With ``time="none"`` every row is treated as a steady state, and the net is trained with k = m = 0.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class NetARX(ClockedRegressor):
         [s]
     net_ : Perceptron
     trials_ : tuple of TriedSetting
-        Numbers of hidden nodes that were assessed; empty if there was no choice.
+        Numbers of hidden nodes that were assessed; empty if there was nothing to choose.
     cv_rms_ : float
     chosen_by_ : str
     free_run_rms_ : float
@@ -156,7 +156,7 @@ class NetARX(ClockedRegressor):
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         sizes = tuple(int(h) for h in np.atleast_1d(self.hidden))
         if not sizes or min(sizes) < 1:
-            raise InputError(f"hidden = {self.hidden}: expected numbers of nodes, at least 1")
+            raise InputError(f"hidden = {self.hidden}: expected numbers of nodes, each at least 1")
         h = self._intervals(self.interval, step)[0]
         data = Clocked.of(inputs, deviation, step, folds, h)
         self.k_, self.m_ = (0, 0) if self.time == "none" else self._chosen_orders(inputs, deviation, step, folds)

@@ -35,10 +35,10 @@ class AveragedDynamic(TimedRegressor):
     """Average of many ridge regressions on lagged temperatures and on states of the spindle speed.
 
     A few thermal cycles cannot determine the time constants of a machine: the set with the smallest error on a left-out
-    cycle is best by chance and does worse on the next. Therefore none is chosen. Each of many structures draws at
-    random some lags, the same for all temperatures, some speed states (`PacedDynamic`) and a ridge penalty. The weights
-    of all structures are averaged; structures with smaller errors on left-out half cycles (run or stop) have a greater
-    share. Since every structure is linear in the same states, their average is a single model of that form.
+    cycle is best by chance and does worse on the next. Therefore no single set is chosen. Each of many structures draws
+    at random some lags, the same for all temperatures, some speed states (`PacedDynamic`) and a ridge penalty. The
+    weights of all structures are averaged; structures with smaller errors on left-out half cycles (run or stop) have a
+    greater share. Since every structure is linear in the same states, their average is a single model of that form.
 
     Each ridge regression adds the covariance that noise of the sensors in use, including noise in the zero, causes in
     the features: the limit of a regression on inputs with that noise. The model does not rely on differences that are
@@ -57,8 +57,8 @@ class AveragedDynamic(TimedRegressor):
     powers : sequence of float
         Exponents of the speed as a fraction of the top speed.
     stopped, running : sequence of float
-        Time constants of the speed states at rest and at top speed [s]; all pairs are used whose running time constant
-        is not the longer one.
+        Time constants of the speed states at rest and at top speed [s]; all pairs are used in which the time constant
+        at top speed does not exceed that at rest.
     structures : int
         Number of averaged structures.
     random_state : int
@@ -76,15 +76,14 @@ class AveragedDynamic(TimedRegressor):
     top_speed_ : float
         Greatest speed in the training rows [1/min].
     cv_rms_ : float
-        Mean over the left-out parts of the root mean square error on each [unit of y].
+        Mean of the RMS errors on the left-out parts [unit of y].
     chosen_by_ : str
-        Kind of units that were left out.
+        Description of the cross-validation folds.
     left_out_ : ndarray of shape (n_rows, 2)
         Prediction for each training row by structures fitted without its cycle, and their spread [unit of y]; nan
         elsewhere.
     gain_ : ndarray of shape (n_inputs,)
-        Sensitivity of y to each temperature within one step between rows, in absolute value [unit of y per degC]; 0
-        for a speed.
+        Magnitude of the response of y to a step of each temperature, after one row [unit of y per degC]; 0 for a speed.
 
     References
     ----------

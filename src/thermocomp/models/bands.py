@@ -26,9 +26,9 @@ def find_band(
 ) -> Band | None:
     """Return the uncertainty band of a model from the errors on its left-out training cycles.
 
-    The error is expressed in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between run and
-    stop. Errors within a cycle are dependent, so n cycles count as n independent values. The size for one further
-    cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom times
+    The error is expressed in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between a running
+    and a stopped spindle. Errors within a cycle are dependent, so n cycles count as n independent values. The size for
+    one further cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom times
     sqrt(1 + 1/n). From `CONFORMAL` cycles onwards, the only assumption is that the cycles are exchangeable: the
     quantile of the errors, with equal weight for each cycle and for one additional unknown cycle.
 

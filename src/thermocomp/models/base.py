@@ -28,7 +28,7 @@ def plain_inputs(names: Sequence[str], low: FloatArray, high: FloatArray) -> tup
 
 
 class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
-    """A regressor that freezes into plain numbers.
+    """A regressor that can be frozen into plain numbers.
 
     The columns of X are the inputs minus their reference ("change"). `fit` sets the trained range as ``data_min_`` and
     ``data_max_`` of shape (n_features,).
@@ -47,7 +47,7 @@ class ThermalRegressor(RegressorMixin, BaseEstimator, ABC):
     ) -> ErrorModel:
         """Return the fitted model as plain numbers, without unused inputs.
 
-        Failure of a sensor that was not selected has no effect.
+        Failure of a sensor that was not selected therefore does not affect the model.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class MemorylessRegressor(ThermalRegressor):
         Returns
         -------
         ndarray of shape (n_rows,)
-            A net that was fitted to several columns of y returns several: (n_rows, n_outputs).
+            For a net that was fitted to several columns of y: (n_rows, n_outputs).
         """
         return self._predict(self._checked(X))
 
@@ -152,7 +152,7 @@ class MemorylessRegressor(ThermalRegressor):
         if folds.min() < 0:
             learned = folds >= 0
             if learned.sum() < 2:
-                raise FitError("a single row to learn from: at least 2 are needed")
+                raise FitError("only one training row; at least 2 are required")
             # column-major again: rows that are left out must not change a single digit
             change, deviation, folds = np.asfortranarray(change[learned]), deviation[learned], folds[learned]
         self._note_range(change)
@@ -192,12 +192,12 @@ class StaticRegressor(MemorylessRegressor):
 
 
 class CycledRegressor(MemorylessRegressor):
-    """A memoryless regressor that chooses its settings by leaving out thermal cycles.
+    """A memoryless regressor that chooses its settings by cross-validation over thermal cycles.
 
     Attributes
     ----------
     chosen_by_ : str
-        Kind of units left out for the choice.
+        Description of the cross-validation folds.
     """
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> Self:

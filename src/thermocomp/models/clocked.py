@@ -1,4 +1,4 @@
-"""Common part of the autoregressive estimators: data on a clock, inputs, and the candidates tried."""
+"""Common part of the autoregressive estimators: resampled data, inputs, and the candidates tried."""
 
 import math
 from abc import abstractmethod
@@ -20,8 +20,9 @@ from thermocomp.models.timed import TimedRegressor
 MEMORY = 1.0
 
 NO_SPEED = (
-    "there is no spindle speed to predict from: an autoregressive model knows nothing else (P-01). Record the spindle "
-    "speed and map its channel, name other inputs, or take a method that predicts from temperatures, such as dynamic"
+    "there is no spindle speed to predict from, the default input of an autoregressive model (P-01). Record the "
+    "spindle speed and map its channel, name other inputs, or use a method that predicts from temperatures, such as "
+    "dynamic"
 )
 
 
@@ -49,7 +50,7 @@ class TriedSetting:
 
 @dataclass(frozen=True, eq=False)
 class Clocked:
-    """Training data resampled to the clock of one interval.
+    """Training data resampled at one interval.
 
     Parameters
     ----------
@@ -146,9 +147,8 @@ class ClockedRegressor(TimedRegressor):
         self._some = not np.array_equal(self._columns, np.arange(rows.shape[1]))
         names = ", ".join(self._names()[j] for j in self._columns)
         self.caution_ = (
-            f"It knows {names} and nothing else: what comes from elsewhere, such as a change of the ambient "
-            "temperature, is outside this model (E-P6). Judge it in free run on other conditions, never one step "
-            "ahead (E-P3)."
+            f"Its only inputs are {names}: it does not represent other influences, such as a change of the ambient "
+            "temperature (E-P6). Judge it in free run under other conditions, never one step ahead (E-P3)."
         )
         self._learn(self._used(rows), deviation, step, folds)
 
@@ -168,7 +168,7 @@ class ClockedRegressor(TimedRegressor):
             raise FitError(NO_SPEED)
         found = [self._place(s, "input") for s in self.inputs]
         if len(set(found)) < len(found):
-            raise InputError(f"inputs {list(self.inputs)}: one is given twice")
+            raise InputError(f"inputs {list(self.inputs)}: a column is given twice; give each one once")
         return np.array(found, dtype=np.intp)
 
     def _used(self, rows: FloatArray) -> FloatArray:
@@ -212,6 +212,6 @@ def rms(error: FloatArray) -> float:
 def too_few(n: int, k: int, m: int, data: Clocked) -> str:
     """Return the message that there are too few rows for the given orders."""
     return (
-        f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} ticks have a known past, fewer than "
-        "there are coefficients or just as many; take a shorter interval, smaller orders or a longer recording"
+        f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} ticks have a known past, which is not "
+        "more than the number of coefficients; use a shorter interval, smaller orders or a longer recording"
     )

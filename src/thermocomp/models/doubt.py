@@ -57,7 +57,7 @@ class Doubt:
         dt : float
             Time between two rows [s].
         room : ndarray of shape (n_rows, n_temperatures), optional
-            Effect of the room on each temperature [degC]. The effect of the speed is predicted.
+            Effect of the ambient temperature on each temperature [degC]. The effect of the speed is predicted.
         """
         step = np.full(len(speed), dt)
         step[0] = np.inf
@@ -99,12 +99,12 @@ def find_doubt(samples: Samples) -> Doubt:
     if len(speeds) != 1 or len(speeds) == len(complete.inputs):
         names = ", ".join(c.name for c in complete.inputs)
         raise InputError(
-            f"the inputs {names}: a test is planned from one spindle speed and at least one temperature; name them "
-            "with --inputs, or specify the speed column in a mapping"
+            f"inputs {names}: planning a test requires one spindle speed and at least one temperature; name them with "
+            "--inputs, or specify the speed column in a mapping"
         )
     learned = np.isfinite(complete.deviations).all(axis=1) & (complete.cycle >= 0)
     if learned.sum() < 20:
-        raise FitError(f"{int(learned.sum())} rows with all inputs and targets: at least 20 are needed to plan from")
+        raise FitError(f"{int(learned.sum())} rows contain all inputs and targets; planning requires at least 20")
     rows, step = complete.change(), complete.dt()
     folds, _ = number_folds(np.where(learned, complete.cycle, -1), len(complete))
     features, parts, _ = of.lay_out(rows, step, folds, speeds)

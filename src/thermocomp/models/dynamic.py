@@ -46,7 +46,7 @@ _CHUNK = 20_000  # feature rows held in memory at once: bounds the memory of a f
 
 @dataclass(frozen=True)
 class _Candidate:
-    """One choice of time constants, and its columns in the table of all features."""
+    """One set of time constants, and its columns in the table of all features."""
 
     temperature_lags: tuple[float, ...]
     speed_lags: tuple[float, ...]
@@ -59,9 +59,9 @@ class DynamicRidge(TimedRegressor):
 
     Temperature sensors and structure have different time constants, and the heat at a bearing increases more than
     proportionally with the speed; both effects become linear in first-order lags of the temperatures, of the speed and
-    of its square. The ridge strength and the set of time constants are chosen by leaving out whole thermal cycles in
-    turn, within the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose
-    mean RMS is within one standard error of the smallest (one-standard-error rule of Breiman et al. 1984). Sets with a
+    of its square. The ridge strength and the set of time constants are chosen by cross-validation over thermal cycles,
+    within the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
+    RMS is within one standard error of the smallest (one-standard-error rule of Breiman et al. 1984). Sets with a
     temperature lag below `SHORTEST_LAG` times the time between two rows (median) are not tried; if no set remains, the
     temperatures are not lagged.
 
@@ -97,7 +97,7 @@ class DynamicRidge(TimedRegressor):
     cv_rms_ : float
         Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Kind of units left out for the choice.
+        Description of the cross-validation folds.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""External regressors: any scikit-learn regressor, or a small custom class, assessed with the methods."""
+"""External regressors: any scikit-learn regressor, or a small custom class, assessed like built-in methods."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -84,20 +84,24 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
     -------
     ndarray of shape (n_rows,)
     """
-    with catch_failures(f"{name} predicts no numbers"):
+    with catch_failures(f"{name} predicts values that are not numbers"):
         found = np.asarray(predicted, dtype=np.float64)
     if found.shape not in ((n_rows,), (n_rows, 1)):
-        raise FitError(f"{name}: predict gave an array of shape {found.shape} for {n_rows} rows")
+        raise FitError(
+            f"{name}: predict returned an array of shape {found.shape} for {n_rows} rows; expected one number per row"
+        )
     wrong = np.flatnonzero(~np.isfinite(found))
     if wrong.size:
-        raise FitError(f"{name} predicts {found.flat[wrong[0]]:g} in {wrong.size} of {n_rows} rows")
+        raise FitError(
+            f"{name} predicts {found.flat[wrong[0]]:g} in {wrong.size} of {n_rows} rows; expected finite numbers"
+        )
     return found.reshape(n_rows)
 
 
 def adopt_estimator(estimator: Any) -> Any:
     """Return a user-supplied estimator in a form that can be trained and judged."""
     if isinstance(estimator, type):
-        raise InputError(f"{estimator.__name__} is a class: give an instance, {estimator.__name__}()")
+        raise InputError(f"{estimator.__name__} is a class: pass an instance, {estimator.__name__}()")
     if isinstance(estimator, TimedRegressor):
         return estimator.routed()
     if isinstance(estimator, ThermalRegressor):
@@ -106,14 +110,14 @@ def adopt_estimator(estimator: Any) -> Any:
         return PipelineRegressor(estimator)
     if not isinstance(estimator, BaseEstimator) or not (is_regressor(estimator) or hasattr(estimator, "freeze")):
         raise InputError(
-            f"{type(estimator).__name__} is not a regressor: name a method, or give an instance of a class derived "
+            f"{type(estimator).__name__} is not a regressor: name a method, or pass an instance of a class derived "
             "from sklearn.base.RegressorMixin and BaseEstimator, with fit(X, y) and predict(X)"
         )
     for name, part in estimator.get_params().items():
         if isinstance(part, TimedRegressor):
             raise InputError(
                 f"{type(part).__name__} ({name}) has a memory, and {title(estimator)} cannot pass it the time here: "
-                "give it alone, or in a Pipeline of selectors and one method that freezes"
+                "use it alone, or in a Pipeline of selectors and one method that can be frozen"
             )
     return estimator if hasattr(estimator, "freeze") else ForeignRegressor(estimator)
 

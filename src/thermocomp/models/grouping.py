@@ -112,7 +112,10 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
         self.candidates_ = tuple(i for i in others if moving[i])
         self.left_out_ = tuple(i for i in others if not moving[i])
         if not self.candidates_:
-            raise FitError(f"none of the {len(others)} temperatures varies: there is nothing to group")
+            raise FitError(
+                f"none of the {len(others)} temperatures varies, so there is nothing to group; use recordings in which "
+                "they change"
+            )
         self.correlation_ = correlation(change[:, self.candidates_])
         tri = triangle(join_columns(values[:, self.candidates_], deviation), intercept=self.fit_intercept)
         choice = choose(tri, group(self.correlation_, self.threshold, absolute=self.absolute))
@@ -190,8 +193,8 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
             return None
         if isinstance(self.reference, str):
             if self.reference not in names:
-                raise InputError(f"reference: no input is named {self.reference!r}; there are {', '.join(names)}")
+                raise InputError(f"reference: no input is named {self.reference!r}; the inputs are {', '.join(names)}")
             return names.index(self.reference)
         if not 0 <= self.reference < len(names):
-            raise InputError(f"reference {self.reference}: there are {len(names)} inputs, the first is 0")
+            raise InputError(f"reference {self.reference}: expected an index from 0 to {len(names) - 1}")
         return int(self.reference)

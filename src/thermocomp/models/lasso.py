@@ -21,7 +21,8 @@ _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; c
 class Lasso(PenalisedRegressor):
     """Lasso (Tibshirani 1996) on standardised inputs: selector and regression in one.
 
-    Uses scikit-learn's coordinate descent along the whole path; the strength is chosen by leaving out thermal cycles.
+    Uses scikit-learn's coordinate descent along the whole path; the strength is chosen by cross-validation over thermal
+    cycles.
 
     Parameters
     ----------
@@ -95,8 +96,8 @@ class Lasso(PenalisedRegressor):
 class ElasticNet(Lasso):
     """Elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
 
-    Uses scikit-learn's coordinate descent along the whole path; strength and L1 share are chosen by leaving out thermal
-    cycles.
+    Uses scikit-learn's coordinate descent along the whole path; strength and L1 share are chosen by cross-validation
+    over thermal cycles.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class TermRegressor(MemorylessRegressor):
     standard_error_ : float
         Standard error of estimate, with the rows treated as independent [unit of y].
     n_effective_ : float
-        Number of independent rows equivalent to the training rows, by the autocorrelation of the residual (E-C12).
+        Effective sample size of the training rows, from the autocorrelation of the residual (E-C12).
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
     """

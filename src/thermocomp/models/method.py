@@ -10,14 +10,14 @@ from thermocomp.models.base import ThermalRegressor
 
 @dataclass(frozen=True)
 class Method:
-    """A way to get a model.
+    """A modelling method.
 
     Parameters
     ----------
     name : str
         Name on the command line.
     summary : str
-        Summary in one line.
+        One-line summary.
     estimator : str
         Module and class, such as ``package.module:Class``; imported on use, since some load a compiler.
     speed : str

@@ -47,7 +47,10 @@ def _registered() -> dict[str, Method]:
             continue
         for method in methods:
             if found.setdefault(method.name, method) is not method:
-                warnings.warn(f"{describe_plugin(entry)}: there is a method {method.name} already", stacklevel=2)
+                warnings.warn(
+                    f"{describe_plugin(entry)}: the method name {method.name} is already in use; it is ignored",
+                    stacklevel=2,
+                )
     return found
 
 
@@ -66,14 +69,14 @@ def find_method(name: str) -> Method:
     if found is None:
         near = get_close_matches(name, METHODS, n=1, cutoff=0.4)
         hint = f"; did you mean {near[0]}?" if near else "."
-        raise InputError(f"unknown model {name!r}{hint} Known are {', '.join(METHODS)}")
+        raise InputError(f"unknown model {name!r}{hint} The models are {', '.join(METHODS)}")
     return found
 
 
 def expand(names: Sequence[Any]) -> list[str]:
     """Return the names of methods without duplicates; ``all`` denotes all methods."""
     if not names:
-        raise InputError("no model given: name at least one method, such as dynamic, or all of them by all")
+        raise InputError("no model given: name at least one method, such as dynamic, or 'all'")
     listed: dict[str, None] = {}
     for entry in names:
         if isinstance(entry, NamedEstimator):

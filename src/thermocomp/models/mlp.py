@@ -58,9 +58,9 @@ class SigmoidNet(NetRegressor):
     ----------
     hidden : int or sequence of int
         Number of hidden nodes; Chen uses 20 for the spindle drifts and 8 for the slope (C-26, C-27). If several numbers
-        are given, the best is chosen by leaving out whole thermal cycles of the data given to `fit`: the numbers are
-        tried in ascending order until two in a row bring no improvement, and the smallest number is chosen whose mean
-        RMS is within one standard error of the best.
+        are given, the best is chosen by cross-validation over the thermal cycles of the data given to `fit`: the
+        numbers are tried in ascending order until two in a row bring no improvement, and the smallest number is chosen
+        whose mean RMS is within one standard error of the best.
     n_epochs : int
         Number of passes through the patterns.
     learning_rate, final_learning_rate : float
@@ -95,7 +95,7 @@ class SigmoidNet(NetRegressor):
     sweep_ : tuple of HiddenCount
         Numbers of hidden nodes that were tried; empty if `hidden` is a single number.
     chosen_by_ : str
-        Kind of units left out for the choice.
+        Description of the cross-validation folds.
     net_, input_scaling_, output_scaling_, n_parameters_, n_patterns_, n_effective_, caution_, data_min_, data_max_
         See `thermocomp.models.nets.NetRegressor`.
 
@@ -203,7 +203,7 @@ class SigmoidNet(NetRegressor):
             if moving.any():
                 low[moving], high[moving] = low[moving].min(), high[moving].max()
         elif self.scaling != "channel":
-            raise InputError(f"scaling {self.scaling!r}: known are channel and common")
+            raise InputError(f"scaling {self.scaling!r}: expected 'channel' or 'common'")
         return scaling_in(low, high)
 
     def _sweep(
@@ -217,7 +217,7 @@ class SigmoidNet(NetRegressor):
         """Choose the number of hidden nodes (C-26)."""
         counts = sorted({int(h) for h in np.atleast_1d(np.asarray(self.hidden))})
         if not counts:
-            raise InputError("hidden: no number of hidden nodes to choose from")
+            raise InputError("hidden: no number of hidden nodes to choose from; give at least one")
 
         def rms(n_hidden: int, fold: int) -> float:
             rest, mine = folds != fold, folds == fold

@@ -102,11 +102,13 @@ class SklearnNet(StaticRegressor, NetRegressor):
         self.converged_, self.n_iter_ = not unfinished, int(peer.n_iter_)
         if unfinished:
             first_line = str(unfinished[0].message).splitlines()[0].rstrip(":.")
-            self.caution_ = "; ".join(filter(None, [f"scikit-learn's solver gave up: {first_line}", self.caution_]))
+            self.caution_ = "; ".join(
+                filter(None, [f"scikit-learn's solver stopped early: {first_line}", self.caution_])
+            )
 
 
 def _standard(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return gain and offset to mean 0 and standard deviation 1, and that deviation; all 0 for constant channels."""
+    """Return gain and offset that standardise channels, and their standard deviations; all 0 for constant channels."""
     still = constant(values.min(axis=0), values.max(axis=0))
     deviation = np.where(still, 0.0, values.std(axis=0))
     gain = 1.0 / np.where(still, np.inf, deviation)

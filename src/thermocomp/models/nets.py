@@ -1,4 +1,4 @@
-"""Common part of the neural nets: data checks, scaling, warning of too many weights, and `freeze`."""
+"""Common part of the neural nets: data checks, scaling, warning about too many weights, and `freeze`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -28,7 +28,7 @@ class NetRegressor(MemorylessRegressor):
     n_patterns_ : int
         Number of training rows.
     n_effective_ : float
-        Number of equivalent independent rows, from the autocorrelation of the residual (E-C12); the minimum over
+        Effective sample size of the training rows, from the autocorrelation of the residual (E-C12); the minimum over
         several outputs.
     caution_ : str
         Reason not to trust the net, mainly more parameters than independent rows (C-27); otherwise empty.
@@ -51,7 +51,8 @@ class NetRegressor(MemorylessRegressor):
             output = 0
         if output is None or not 0 <= output < n_outputs:
             raise InputError(
-                f"output {output}: the net has {n_outputs}; freeze each separately, with output=0 .. {n_outputs - 1}"
+                f"output {output}: the net has {n_outputs} outputs; freeze each separately, with output=0 .. "
+                f"{n_outputs - 1}"
             )
         # inputs with gain 0 are merged into the thresholds
         kept = [i for i, gain in enumerate(into.gain) if gain != 0 and out_of.gain[output] != 0]
@@ -94,13 +95,14 @@ class NetRegressor(MemorylessRegressor):
         self.caution_ = ""
         if self.n_parameters_ > self.n_effective_:
             self.caution_ = (
-                f"the net has {self.n_parameters_} weights and thresholds, but the {n_rows} rows it learned count as "
-                f"{self.n_effective_:.0f} independent ones: it may know them by heart; trust it on unseen cycles only"
+                f"the net has {self.n_parameters_} weights and thresholds, but its {n_rows} training rows are "
+                f"equivalent to only {self.n_effective_:.0f} independent rows: it may be overfitted; judge it by "
+                "unseen cycles only"
             )
 
 
 def thin_rows(n_rows: int, n_most: int) -> IntArray:
     """Return the indices of at most `n_most` of `n_rows` rows, evenly spread, including the first and the last."""
     if n_most < 2:
-        raise InputError(f"at most {n_most} patterns: expected at least 2")
+        raise InputError(f"maximum number of patterns {n_most}: expected at least 2")
     return np.linspace(0, n_rows - 1, min(n_rows, n_most)).round().astype(np.intp)

@@ -4,18 +4,22 @@ from thermocomp.models.method import Method
 
 OWN = (
     Method("ols", "least squares on all temperatures", "thermocomp.models.ols:LeastSquares"),
-    Method("partial-f", "stepwise by partial F, 100 to enter and 50 to delete", "thermocomp.models.partial_f:PartialF"),
+    Method(
+        "partial-f",
+        "stepwise regression by partial F, 100 to enter and 50 to delete",
+        "thermocomp.models.partial_f:PartialF",
+    ),
     Method("mra", "Chen's stepwise second-order regression", "thermocomp.models.second_order:SecondOrderRegression"),
     Method(
         "averaged",
-        "average of many ridges on lagged temperatures and states of the spindle speed",
+        "average of many ridge regressions on lagged temperatures and states of the spindle speed",
         "thermocomp.models.averaged:AveragedDynamic",
         speed="speed",
         takes=("dt", "cycle"),
     ),
     Method(
         "dynamic",
-        "ridge on temperatures, their lagged copies and the lagged spindle speed",
+        "ridge regression on temperatures, their lagged copies and the lagged spindle speed",
         "thermocomp.models.dynamic:DynamicRidge",
         speed="speed",
         takes=("dt", "cycle"),
@@ -28,10 +32,10 @@ OWN = (
     Method(
         "subsets", "exact best subset of the temperatures", "thermocomp.models.subsets:BestSubset", takes=("cycle",)
     ),
-    Method("ace", "Wessel's optimal transformations as printed, for a few temperatures", "thermocomp.models.ace:ACE"),
+    Method("ace", "Wessel's optimal transformations as published, for a few temperatures", "thermocomp.models.ace:ACE"),
     Method(
         "ace-monotone",
-        "the same with a transformation that can be inverted",
+        "optimal transformations, with an invertible one of the deviation",
         "thermocomp.models.ace_monotone:MonotoneACE",
     ),
     Method(
@@ -47,7 +51,7 @@ OWN = (
     ),
     Method(
         "arx-free-run",
-        "the same, fitted to the free run, orders by cycles left out",
+        "autoregression on the spindle speed alone, fitted in free run, orders by cross-validation",
         "thermocomp.models.arx:ARX",
         speed="inputs",
         takes=("dt", "cycle"),
@@ -55,7 +59,7 @@ OWN = (
     ),
     Method(
         "arx-net",
-        "a sigmoid net in place of the linear recursion",
+        "autoregression on the spindle speed alone by a sigmoid net",
         "thermocomp.models.arx_net:NetARX",
         speed="inputs",
         takes=("dt", "cycle"),
@@ -68,7 +72,7 @@ OWN = (
         takes=("cycle",),
     ),
     Method("pls", "partial least squares", "thermocomp.models.pls:PartialLeastSquares", takes=("cycle",)),
-    Method("lasso", "regression that drops temperatures by itself", "thermocomp.models.lasso:Lasso", takes=("cycle",)),
+    Method("lasso", "regression that also selects the temperatures", "thermocomp.models.lasso:Lasso", takes=("cycle",)),
     Method(
         "elastic-net",
         "a lasso that keeps or drops collinear temperatures together",

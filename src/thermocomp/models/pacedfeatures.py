@@ -152,7 +152,7 @@ class PacedFeatures:
         return covariance
 
     def shares(self, step: FloatArray) -> FloatArray:
-        """Return the fraction of a step that each copy of a temperature follows within the usual step, (n_copies,)."""
+        """Return the response of each copy of a temperature to a unit step, after the usual time step, (n_copies,)."""
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
     def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:

@@ -8,10 +8,10 @@ from thermocomp.models.shrinkage import ComponentRegressor
 
 
 class PrincipalComponents(ComponentRegressor):
-    """Principal component regression, used by Miao et al. against collinear temperatures (T-10).
+    """Principal component regression, used by Miao et al. for collinear temperatures (T-10).
 
     Least squares on the first principal components of the standardised inputs, in order of variance; their number is
-    chosen by leaving out thermal cycles. A single decomposition serves all numbers of components.
+    chosen by cross-validation over thermal cycles. A single decomposition serves all numbers of components.
 
     Parameters
     ----------

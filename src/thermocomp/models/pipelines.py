@@ -83,8 +83,9 @@ def freeze(
         return frozen
     if not freezes(estimator):
         raise FitError(
-            "a Pipeline can be frozen if it is selectors or a StandardScaler, and then one method of thermocomp's that "
-            f"can be frozen; this one is {', '.join(type(s).__name__ for s in _steps(estimator))}"
+            "a Pipeline can be frozen if it consists of selectors or a StandardScaler, followed by one method of "
+            "thermocomp that can be frozen; this one consists of "
+            f"{', '.join(type(s).__name__ for s in _steps(estimator))}"
         )
     check_is_fitted(estimator)
     last = _steps(estimator)[-1]
@@ -92,7 +93,7 @@ def freeze(
     hidden = last.n_features_in_ - len(last.data_min_)  # number of leading time columns
     if (columns[:hidden] != np.arange(hidden)).any():
         raise FitError(
-            "a step before the last has not kept the time, the first column: give its selector time='column'"
+            "a step before the last has removed the first column, the time: set time='column' in its selector"
         )
     columns, mean, scale = columns[hidden:], mean[hidden:], scale[hidden:]
     if inputs is None:
@@ -204,8 +205,8 @@ def _unscaled(model: ErrorModel, scaling: dict[str, tuple[float, float]]) -> Pol
     """Return the model of scaled inputs as a model of the unscaled inputs."""
     if not isinstance(model, Polynomial) or any(len(term) > 1 for term in model.terms):
         raise FitError(
-            f"a StandardScaler before a model of the family {model.family} cannot be frozen: its inputs are multiplied "
-            "or remembered. Leave the scaler out; the methods scale by themselves"
+            f"a StandardScaler before a model of the family {model.family} cannot be frozen: the model multiplies "
+            "inputs or has a memory. Remove the scaler; the methods scale their inputs themselves"
         )
     variables, constants = [], []
     for v in model.variables:

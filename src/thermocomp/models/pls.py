@@ -13,7 +13,7 @@ class PartialLeastSquares(ComponentRegressor):
     """Partial least squares (Wold): components chosen by covariance with the deviation, not by input variance alone.
 
     Uses scikit-learn's `PLSRegression` on standardised inputs. Its components are computed sequentially, so one fit
-    serves all numbers of components; the number is chosen by leaving out thermal cycles.
+    serves all numbers of components; the number is chosen by cross-validation over thermal cycles.
 
     Parameters
     ----------

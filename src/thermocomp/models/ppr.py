@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from thermocomp.core.additive import Additive, Curve
+from thermocomp.core.additive import Additive
+from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.terms import Variable
@@ -31,7 +32,7 @@ class ProjectionPursuit(CycledRegressor):
     the others: the direction by Gauss-Newton steps, the curve by a smoother. After each new term all terms are refitted
     in turn (backfitting), as in Friedman's SMART (1984) and R's ``ppr``. Differences: the curves are penalised linear
     splines, so that the frozen model represents them exactly and tied temperatures need no rule; terms are only added,
-    never dropped; and the number of terms and the smoothness are chosen by leaving out thermal cycles.
+    never dropped; and the number of terms and the smoothness are chosen by cross-validation over thermal cycles.
 
     A curve is constant outside the range of its projection in training.
 
@@ -59,7 +60,7 @@ class ProjectionPursuit(CycledRegressor):
     cv_rms_ : float
         Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Kind of units left out for the choice.
+        Description of the cross-validation folds.
     data_min_, data_max_ : ndarray of shape (n_features,)
         Trained range.
 

@@ -15,7 +15,8 @@ from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: `dynamic` without memory.
 
-    Uses scikit-learn's `ridge_regression` by singular values; the strength is chosen by leaving out thermal cycles.
+    Uses scikit-learn's `ridge_regression` by singular values; the strength is chosen by cross-validation over thermal
+    cycles.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ class SecondOrderRegression(StepwiseRegressor):
             return tuple(known.values())
         for name in self.subset:
             if name not in known:
-                raise InputError(f"subset: no variable is named {name!r}; there are {', '.join(known)}")
+                raise InputError(f"subset: no variable is named {name!r}; the variables are {', '.join(known)}")
         return tuple(known[name] for name in dict.fromkeys(self.subset))
 
 

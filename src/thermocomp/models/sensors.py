@@ -37,8 +37,8 @@ class SensorSelector(SelectorMixin, BaseEstimator):
     Parameters
     ----------
     method : str or estimator
-        ``grouping``, ``partial-f``, ``stepwise``, ``subsets``, ``lasso``; or such an estimator with custom settings,
-        such as ``CorrelationGrouping(threshold=0.95)``. All inputs used by its frozen model are kept.
+        ``grouping``, ``partial-f``, ``stepwise``, ``subsets``, ``lasso``; or the estimator of such a method with custom
+        settings, such as ``CorrelationGrouping(threshold=0.95)``. All inputs used by its frozen model are kept.
     keep : sequence of str or int
         Names (or indices) of columns that are always kept, such as the spindle speed.
     time : {'column'} or None
@@ -99,10 +99,12 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         names = [str(n) for n in getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])]
         given = self._kept(names)
         if self.time not in (None, "column"):
-            raise InputError(f"SensorSelector: time={self.time!r}: give 'column' or None")
+            raise InputError(f"SensorSelector: time={self.time!r}: expected 'column' or None")
         free = np.flatnonzero(~given)
         if not free.size:
-            raise InputError("SensorSelector: every column is kept, so there is none to choose from")
+            raise InputError(
+                "SensorSelector: keep contains every column, so there is none to choose from; remove some from keep"
+            )
         method = self._method()
         cycles = {} if cycle is None or "cycle" not in signature(method.fit).parameters else {"cycle": cycle}
         candidates = pd.DataFrame(values[:, free], columns=[names[j] for j in free])
@@ -124,7 +126,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
                 raise InputError(f"SensorSelector: keep {column!r}: the columns are {', '.join(names)}")
             place = names.index(column) if isinstance(column, str) else int(column)
             if not 0 <= place < len(names):
-                raise InputError(f"SensorSelector: keep {column!r}: there are {len(names)} columns, the first is 0")
+                raise InputError(f"SensorSelector: keep {column!r}: expected an index from 0 to {len(names) - 1}")
             mask[place] = True
         return mask
 

@@ -1,4 +1,4 @@
-"""Common part of linear regressions chosen from a path of increasing complexity by leaving out thermal cycles."""
+"""Common part of linear regressions chosen from a path of increasing complexity by cross-validation."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -59,7 +59,7 @@ def choose(rms: FloatArray, rule: Rule) -> tuple[int, int]:
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ShrunkRegressor(CycledRegressor, TermRegressor):
-    """Linear regression on standardised inputs whose complexity is chosen by leaving out thermal cycles.
+    """Linear regression on standardised inputs whose complexity is chosen by cross-validation over thermal cycles.
 
     Each thermal cycle among the training rows is left out in turn; the whole path of models is fitted to the others and
     predicts the left-out cycle. Constant inputs get the coefficient 0.
@@ -76,7 +76,7 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
     cv_rms_ : float
         Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
-        Kind of units left out for the choice.
+        Description of the cross-validation folds.
     r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_ : float
         See `thermocomp.models.linear.TermRegressor`; each non-zero coefficient counts as a parameter.
     dependent_ : tuple of str
@@ -139,7 +139,7 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
 
 
 class PenalisedRegressor(ShrunkRegressor):
-    """Linear regression with a penalty on the coefficients, whose strength is chosen by leaving out thermal cycles.
+    """Linear regression with a penalty on the coefficients, whose strength is chosen by cross-validation.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class PenalisedRegressor(ShrunkRegressor):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ComponentRegressor(ShrunkRegressor):
-    """Linear regression on the first components of the inputs, whose number is chosen by leaving out thermal cycles.
+    """Linear regression on the first components of the inputs, whose number is chosen by cross-validation.
 
     Parameters
     ----------
@@ -202,5 +202,5 @@ def sorted_strengths(strengths: ArrayLike) -> FloatArray:
 def most_components(max_components: int | None, n_features: int) -> int:
     """Return the number of components of the most complex model."""
     if max_components is not None and max_components < 1:
-        raise InputError(f"max_components {max_components}: expected at least 1, or None for as many as inputs")
+        raise InputError(f"max_components {max_components}: expected at least 1, or None for the number of inputs")
     return n_features if max_components is None else min(max_components, n_features)

@@ -1,4 +1,4 @@
-"""`subsets`: exact best set of temperatures, with its size chosen by left-out cycles or by a criterion."""
+"""`subsets`: exact best set of temperatures, with its size chosen by cross-validation over cycles or by a criterion."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -54,7 +54,7 @@ def scores(found: Subsets) -> dict[str, FloatArray]:
 class BestSubset(TermRegressor):
     """Linear least squares on the best of all possible sets of temperatures (H-05, H-07).
 
-    For every size the set with the smallest residual sum of squares is found exactly, or the certificate says "not
+    For every size the set with the smallest residual sum of squares is found exactly, or the certificate states "not
     proven" (`thermocomp.models.selection.subsets.best_subsets`). The size is chosen by the criterion. ``cycles``: the
     search is repeated without each thermal cycle in turn, so that the cycle is unseen by the selection as well, and the
     size with the smallest RMS over all left-out cycles is chosen.
@@ -99,7 +99,7 @@ class BestSubset(TermRegressor):
         Criterion that determined the size; ``size`` if the size was given. After a KeyboardInterrupt the search stops
         with its present result, and ``bic`` replaces ``cycles``.
     chosen_by_ : str
-        Kind of units left out for the choice; empty if none.
+        Description of the cross-validation folds; empty if there were none.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`.
 
@@ -159,14 +159,14 @@ class BestSubset(TermRegressor):
         InputError
             A setting is out of range, or there are too many dependent columns (see `max_size`).
         KeyboardInterrupt
-            Interrupted while cycles are left out. After an earlier interrupt, the fit continues with the present
-            result.
+            Interrupted during the cross-validation. An interrupt before that ends only the search, and the fit
+            continues with the present result.
         """
         criterion = self.criterion or ("bic" if cycle is None else "cycles")
         if criterion not in {"mse", "adjr2", "cp", "bic", "cycles"} or (self.size is not None and self.size < 1):
             raise InputError(
-                f"criterion {criterion!r}, size {self.size}: expected mse, adjr2, cp, bic or cycles, and a size from "
-                "1 on"
+                f"criterion {criterion!r}, size {self.size}: expected mse, adjr2, cp, bic or cycles, and a size of at "
+                "least 1"
             )
         change, deviation, folds, left_out = self._learned(X, y, cycle)
         sizes = self.size or self.max_size
@@ -176,7 +176,7 @@ class BestSubset(TermRegressor):
         with suppress(FitError):  # if all columns are constant, the model is the mean
             self.subsets_ = self._search(change, deviation, sizes)
             if not self.subsets_.best:
-                raise InputError("best subsets: stopped before a set was found; give it more sets or seconds")
+                raise InputError("best subsets: stopped before a set was found; increase nodes or seconds")
             self.scores_ = scores(self.subsets_)
             self.criterion_ = "size" if self.size is not None else criterion
             place = -1

@@ -1,6 +1,6 @@
 """Time in scikit-learn: how an estimator with a memory receives the time, and when it raises an error.
 
-scikit-learn treats rows as exchangeable and passes on any part of them. A model with a memory that receives a part
+scikit-learn treats rows as exchangeable and passes on any subset of them. A model with a memory that receives a part
 without its past predicts different values without a warning; it therefore requires a declaration of the time, and rows
 that are complete from the start of each test.
 """
@@ -47,7 +47,7 @@ class TimedRegressor(ThermalRegressor):
         test; from scikit-learn through ``set_fit_request(dt=True)`` etc. With metadata routing enabled it must be a
         pandas Series: its index reveals missing rows.
     ``"none"``
-        Every row is a machine at rest in that state. For scikit-learn's own checks; cannot be frozen or compared.
+        Every row is treated as a steady state. For scikit-learn's own checks; cannot be frozen or compared.
     ``None``
         Not declared: `fit`, `predict` and `score` raise an error.
     """
@@ -64,9 +64,7 @@ class TimedRegressor(ThermalRegressor):
             The estimator has ``time="none"``, which is not intended for use on a machine.
         """
         if self.time == "none":
-            raise InputError(
-                f"{type(self).__name__}(time='none') treats every row as a machine at rest; give it {REMEDY}"
-            )
+            raise InputError(f"{type(self).__name__}(time='none') treats every row as a steady state; give it {REMEDY}")
         named = getattr(self, self.columns)
         if named is not None:
             named = tuple(c if isinstance(c, str) else c - self._hidden for c in named)
@@ -174,7 +172,7 @@ class TimedRegressor(ThermalRegressor):
         """
         if self.time == "none":
             raise FitError(
-                f"{type(self).__name__}(time='none') treats every row as a machine at rest; fit it with {REMEDY}"
+                f"{type(self).__name__}(time='none') treats every row as a steady state; fit it with {REMEDY}"
             )
         return super().freeze(**header)
 
@@ -186,10 +184,10 @@ class TimedRegressor(ThermalRegressor):
         if self.time is None:
             raise InputError(f"{name} has a memory and was not given the time: give it {REMEDY}")
         if self.time not in ("column", "routed", "none"):
-            raise InputError(f"{name}: time={self.time!r} is not known; give it {REMEDY}")
+            raise InputError(f"{name}: unknown time={self.time!r}; give it {REMEDY}")
         fitted = getattr(self, "_time", self.time)
         if fitted != self.time:
-            raise InputError(f"{name} was fitted with time={fitted!r} and has time={self.time!r} now: fit it again")
+            raise InputError(f"{name} was fitted with time={fitted!r} but now has time={self.time!r}: fit it again")
 
     def _given(self, X: ArrayLike, dt: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
         """Check X and time against the fitted model; return the inputs without the time, and the time steps."""
@@ -291,15 +289,15 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
         )
     if fitting and time.max() < LEAST:
         raise InputError(
-            f"time='column': the first column of X ends at {time.max():g} s, which is no thermal test. It must be "
-            "seconds, and not scaled: in a Pipeline let it through by a ColumnTransformer"
+            f"time='column': the first column of X ends at {time.max():g} s, which is too short for a thermal test. It "
+            "must be in seconds and not scaled: in a Pipeline, pass it through with a ColumnTransformer"
         )
     inside = step[~starts]
     if inside.size and inside.max() > GAP * np.median(inside):
         row = int(np.flatnonzero(~starts & (step > GAP * np.median(inside)))[0])
         raise InputError(
-            f"time='column': {step[row]:g} s pass before row {row}, {np.median(inside):g} s as a rule, so rows are "
-            f"missing: {_WHOLE}; {_OURS}. A pause that is in the recording itself needs time='routed'"
+            f"time='column': row {row} comes {step[row]:g} s after the previous row, where {np.median(inside):g} s are "
+            f"usual, so rows are missing: {_WHOLE}; {_OURS}. For a pause in the recording itself, use time='routed'"
         )
     _refuse_holes(index, starts)
     return step
@@ -309,14 +307,14 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
     if dt is None:
         raise InputError(
             f"{name}(time='routed') was given no dt. Under scikit-learn: set_config(enable_metadata_routing=True) and "
-            ".set_fit_request(dt=True).set_predict_request(dt=True).set_score_request(dt=True); a scorer by name "
-            "passes none to predict: score with scoring=None, or use time='column'"
+            ".set_fit_request(dt=True).set_predict_request(dt=True).set_score_request(dt=True); a scorer given by "
+            "name passes no dt to predict: use scoring=None, or use time='column'"
         )
     step = check_steps(dt, n_rows)
     if n_rows and not np.isinf(step[0]):
         raise InputError(
-            f"dt: the first row comes {step[0]:g} s after another, and its test must start with inf. Its start was "
-            f"left out: {_WHOLE}; {_OURS}"
+            f"dt: the first row is {step[0]:g} s after another row, but a test must start with inf. The start of the "
+            f"test was left out: {_WHOLE}; {_OURS}"
         )
     if not hasattr(dt, "index") and get_config()["enable_metadata_routing"]:
         raise InputError(f"{name}: give dt as a pandas Series, pd.Series(dt): its index shows rows that were left out")

@@ -98,12 +98,15 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     how, own = find_method(name), getattr(name, "estimator", None)
     columns = tuple(j for j, c in enumerate(samples.inputs) if how.speed or c.quantity != "spindle_speed")
     if not columns:
-        raise FitError(f"{how.name}: there is no temperature to predict from")
+        raise FitError(
+            f"{how.name}: there is no temperature to predict from; map at least one, or use a method for the spindle "
+            "speed"
+        )
     channel, valid = samples.targets[target], samples.valid
     seen = valid & learn & np.isfinite(samples.deviations[:, target])
     if seen.sum() < 3:
         raise FitError(
-            f"{how.name}: {int(seen.sum())} complete rows of {channel.name} to learn from; at least 3 are needed"
+            f"{how.name}: {int(seen.sum())} complete training rows of {channel.name}; at least 3 are required"
         )
     _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")

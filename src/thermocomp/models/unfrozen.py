@@ -70,7 +70,7 @@ class EstimatorModel(ErrorModel):
     estimator : UnfrozenRegressor
         Fitted estimator.
     fingerprint : str
-        Hash of its numbers, which represents it when two models are compared.
+        Hash of its numbers, used to compare two models.
     known : dict of bytes to float
         Predictions made in advance, with the bytes of the inputs minus their reference as keys.
     """

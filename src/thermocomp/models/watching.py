@@ -1,4 +1,4 @@
-"""Training of a temperature watch: each sensor is predicted by the others, as `averaged` predicts a displacement."""
+"""Training of a temperature watch: each sensor is predicted from the others, as `averaged` predicts a displacement."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -158,7 +158,7 @@ def _resolution(values: FloatArray) -> float:
 
 
 def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:
-    """Return the longest time of constant readings of a sensor, and the change of its prediction during that time."""
+    """Return the longest duration of constant readings of a sensor, and the change of its prediction meanwhile."""
     new = np.append(True, (np.diff(values) != 0) | (np.diff(folds) != 0) | (np.diff(time) <= 0))
     run = np.cumsum(new) - 1
     first = np.flatnonzero(new)

@@ -1,4 +1,4 @@
-"""Claims of a paper as data: entries of ``claims.toml`` beside a study, filled in and judged by what the study found.
+"""Claims of a paper as data: entries of ``claims.toml`` next to a study, filled in and judged with its results.
 
 The file has a table per section, usually the name of the module with the results, and in it an entry per claim, in
 order of presentation:
@@ -9,17 +9,17 @@ order of presentation:
     Our result.
 ``holds``
     Criterion: the name of a truth value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
-    Default: what the facts of the entry call ``holds``; without that the claim is a number for information.
+    Default: ``holds`` among the facts of the entry; if there is none, the claim is a number for information.
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.
 ``parts``
-    Parts of the sentences, by name; see `thermocomp.papers.sentences.Sentences`. Those of a section ``parts`` are for
-    all entries.
+    Parts of the sentences, by name; see `thermocomp.papers.sentences.Sentences`. Those of a section ``parts`` are
+    available to all entries.
 ``each``
-    Repeats the entry for each of several values, which its sentences call ``{each}``.
+    Repeats the entry for each of several values, available in its sentences as ``{each}``.
 
-All texts are templates of `str.format`. A name in capitals is a constant of the module; any other one is in the facts
-of the entry, or else an attribute of the results.
+All texts are templates of `str.format`. A name in capitals is a constant of the module; any other name is a fact of the
+entry or, if there is none, an attribute of the results.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,7 +41,7 @@ class Claims(Generic[_Found]):
     Parameters
     ----------
     module : str
-        Name of the module that has the constants; ``claims.toml`` is in its package.
+        Name of the module that defines the constants; ``claims.toml`` is in its package.
     *others : module
         Modules with further constants.
     section : str
@@ -54,7 +54,7 @@ class Claims(Generic[_Found]):
         self._facts: dict[str, Callable[..., Facts]] = {}
 
     def facts(self, function: Callable[..., Facts]) -> Callable[..., Facts]:
-        """Use a function of the results (and of `each`) for the facts of the entry with its name; a decorator."""
+        """Use a function of the results (and of `each`) for the facts of the entry of its name (decorator)."""
         key = function.__name__.strip("_")
         if key not in self._entries:
             raise KeyError(f"no claim is named {key}")

@@ -73,7 +73,7 @@ def with_noise(samples: Samples, size: float, law: Literal["uniform", "normal"],
 
 
 def cut_off(samples: Samples, name: str) -> Samples:
-    """Return the same rows with the change of one input zero from the start, as for a cut-off sensor."""
+    """Return the same rows with the change of one input set to zero from the start, as for a cut-off sensor."""
     names = [c.name for c in samples.inputs]
     if name not in names:
         raise InputError(f"no input is named {name!r}; there are {', '.join(names)}")

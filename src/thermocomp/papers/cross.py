@@ -283,8 +283,8 @@ def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
     ]
     tasks = (mine[0].task.replace(", ", " ") for mine in rows)
     caption = (
-        "RMS [um] in tests that were not learned from (X-03). Every method is offered all temperatures and the spindle "
-        "speed, and takes what it can use; -: it could not be fitted."
+        "RMS [um] in unseen tests (X-03). Every method is given all temperatures and the spindle speed, and uses those "
+        "that it supports; -: it could not be fitted."
     )
     return StudyTable(caption, ("method", *tasks), cells)
 

@@ -1,15 +1,15 @@
-"""Tables, figures and numbers of a paper's study as data: entries of ``exhibits.toml`` beside it, filled with numbers.
+"""Tables, figures and numbers of a paper's study as data: entries of ``exhibits.toml`` next to it, filled in.
 
 ``tables``
-    ``caption``, and ``columns``: heading, and template of the cells, of each. A row is a tuple, whose items are
-    ``{0}``, ``{1}``, or an object, whose attributes have their names.
+    ``caption``; ``columns``: the heading and the template of the cells of each column. A row is a tuple, with its items
+    as ``{0}``, ``{1}``, or an object, with its attributes by name.
 ``figures``
-    ``caption``; ``columns``: number of panels next to each other (default: 1); ``panels``: title and labels of x and y
-    of each; ``style``, and the labels of curves that are ``dashed`` or ``points``.
+    ``caption``; ``columns``: number of panels next to each other (default: 1); ``panels``: title, x label and y label
+    of each; ``style``, and the labels of the curves that are ``dashed`` or ``points``.
 
 ``numbers``
-    Names of numbers by section, and the values they have: attributes of the results, or further values. Of a
-    collection it is the number of its items.
+    Names and values of numbers, by section: attributes of the results, or further values. The value of a collection
+    is its number of items.
 
 Captions and labels are templates; see `thermocomp.papers.sentences.Sentences`.
 """
@@ -39,7 +39,7 @@ class Exhibits:
         self._file = TextFile("exhibits.toml", module, *others)
 
     def table(self, key: str, items: Iterable[Any], **names: Any) -> StudyTable:
-        """Return a table with a row per item; names are for the caption and the cells."""
+        """Return a table with a row per item; `names` are values for the templates of caption and cells."""
         entry = self._file.content["tables"][key]
         caption = self._file.sentences(names, None).fill(entry["caption"])
         rows = []
@@ -50,7 +50,7 @@ class Exhibits:
         return StudyTable(caption, [heading for heading, _ in entry["columns"]], rows)
 
     def figure(self, key: str, *drawn: Drawn | Panel, **names: Any) -> Figure:
-        """Return a figure: its panels, or the curves of the panels that the entry describes."""
+        """Return a figure from its panels, or from the curves of panels whose texts are in the entry."""
         entry = self._file.content["figures"][key]
         said = self._file.sentences(names, None)
         styles = {name: entry[name] for name in ("style", "dashed", "points") if name in entry}

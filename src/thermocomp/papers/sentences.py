@@ -1,4 +1,4 @@
-"""Templates of the sentences of a study, and the TOML files beside it that contain them."""
+"""Templates of the sentences of a study, and the TOML files next to it that contain them."""
 
 import operator
 import sys
@@ -18,10 +18,10 @@ _COMPARISONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": ope
 class Sentences(Formatter):
     """Templates of `str.format`, extended by lists and by parts of sentences.
 
-    The items of a list, or the values of a mapping, are formatted one by one, and joined by what follows a bar in the
+    The items of a list, or the values of a mapping, are formatted one by one, and joined by the text after a bar in the
     format: ``{errors:.2f| / }``; default: a comma. ``{rows:#}`` is their number. A field with the name of a part is
-    replaced by it: once per item if the value is a list or mapping, with the item as ``{0}``, ``{1}``; if the value is
-    true; or, if there are several versions of the part, by the version, or the versions, that the value names.
+    replaced by this part: once per item, with the item as ``{0}``, ``{1}``, if the value is a list or mapping; once or
+    not at all if the value is true or false. A part with several versions: the value names one or more of them.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class Sentences(Formatter):
         return self.vformat(template, items, self._names)
 
     def value(self, name: str) -> Any:
-        """Return the value of a name, which may have attributes and indices after it."""
+        """Return the value of a name, which may be followed by attributes and indices."""
         return super().get_field(name, (), self._names)[0]
 
     def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
-        """Return the value of a field, with the part of its name filled in."""
+        """Return the value of a field, or the part of the same name, filled in."""
         value, first = super().get_field(field_name, args, kwargs)
         part = self._parts.get(field_name)
         if part is None:
@@ -98,7 +98,7 @@ class TextFile:
     name : str
         Name of the file.
     module : str
-        Name of a module beside it; its names in capitals are constants of the texts.
+        Name of a module in the same package; its names in capitals are constants of the texts.
     *others : module
         Modules with further constants.
     """

@@ -88,9 +88,13 @@ def _joined(found: Sequence[Study], seed: int) -> Study:
 
 
 def not_redone(name: str, why: str) -> Study:
-    """Return the replacement of a study that failed."""
-    claim = Claim(ids=("-",), text="The study can be redone here", paper="", ours="it failed", holds=False, finding=why)
-    return Study(name=name, title=f"{name}: not redone", claims=(claim,), tables=(), figures=(), numbers={}, ran=False)
+    """Return the substitute for a study that failed."""
+    claim = Claim(
+        ids=("-",), text="The study can be reproduced here", paper="", ours="it failed", holds=False, finding=why
+    )
+    return Study(
+        name=name, title=f"{name}: not reproduced", claims=(claim,), tables=(), figures=(), numbers={}, ran=False
+    )
 
 
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:

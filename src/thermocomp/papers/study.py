@@ -153,7 +153,7 @@ class Study:
     title : str
         Title of the paper, with authors and year.
     numbers : mapping of str to float
-        Numbers asserted by the gallery page, by a name that includes the unit (``mae_ann_x_um``).
+        Key numbers, checked on the gallery page, by a name that includes the unit (``mae_ann_x_um``).
     ran : bool
         False: the study failed; its only claim gives the reason.
     """

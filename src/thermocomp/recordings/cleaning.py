@@ -70,7 +70,9 @@ class Cut(Step):
 
     def __post_init__(self) -> None:
         if not self.times:
-            raise self._refuse('name what is cut, such as times = [50.0, [600.0, 660.0]] or ["2024-05-06T08:00:00"]')
+            raise self._refuse(
+                'specify the rows to cut, such as times = [50.0, [600.0, 660.0]] or ["2024-05-06T08:00:00"]'
+            )
 
     def apply(self, rows: Rows) -> Rows:
         """Set the values to missing, or remove the rows."""
@@ -81,7 +83,9 @@ class Cut(Step):
         listed = _listed([rows.place(int(k)) for k in at], at)
         if not self.channels:
             if hit.all():
-                raise InputError(f"{rows.source}: {self.name}: this would remove all {len(hit)} rows")
+                raise InputError(
+                    f"{rows.source}: {self.name}: this would remove all {len(hit)} rows; shorten the times"
+                )
             kept = rows.kept(np.flatnonzero(~hit))
             return kept.noted(f"cut: {len(at)} of {len(hit)} rows{self._why()}: {listed}")
         table = rows.table.copy()
@@ -116,7 +120,9 @@ class Shift(Step):
 
     def __post_init__(self) -> None:
         if not self.channels or self.by_s == 0:
-            raise self._refuse('name whose clock is wrong, and by how much: channels = ["t1_C"] and by_s = -1200.0')
+            raise self._refuse(
+                'specify the channels with the wrong clock and its correction: channels = ["t1_C"] and by_s = -1200.0'
+            )
 
     def apply(self, rows: Rows) -> Rows:
         """Interpolate the channels at their new times; a spindle speed, which is stepwise, keeps its last value."""
@@ -162,7 +168,7 @@ class Rezero(Step):
 
     def __post_init__(self) -> None:
         if not self.channels:
-            raise self._refuse('name which probe, and when: channels = ["z_um"] and at = 3600.0')
+            raise self._refuse('specify the probe and the time: channels = ["z_um"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
         """Offset the values."""
@@ -170,7 +176,9 @@ class Rezero(Step):
         end = np.inf if self.until is None else rows.seconds(self.until, self.name)
         moved = (rows.time >= begin - _SAME) & (rows.time < end - _SAME)
         if not moved.any():
-            raise InputError(f"{rows.source}: {self.name}: there is no row at or after {begin:.10g} s")
+            raise InputError(
+                f"{rows.source}: {self.name}: there is no row at or after {begin:.10g} s; choose an earlier time"
+            )
         first = int(np.argmax(moved))
         table = rows.table.copy()
         notes = []
@@ -178,7 +186,9 @@ class Rezero(Step):
             x = table[name].to_numpy(dtype=np.float64)
             there = np.flatnonzero(moved & np.isfinite(x))
             if not there.size:
-                raise InputError(f"{rows.source}: {self.name}: {name} has no value from {begin:.10g} s on")
+                raise InputError(
+                    f"{rows.source}: {self.name}: {name} has no value from {begin:.10g} s on; choose another time"
+                )
             height = _step(x, first, name, f"{rows.source}: {self.name}") if self.to is None else x[there[0]] - self.to
             table[name] = np.where(moved, x - height, x)
             told = f"{len(there)} values from {rows.place(first)} on by {-height:+.6g}"
@@ -201,7 +211,7 @@ class Swap(Step):
 
     def __post_init__(self) -> None:
         if len(set(self.channels)) != 2:
-            raise self._refuse('name the two that change places, and when: channels = ["t1_C", "t2_C"] and at = 3600.0')
+            raise self._refuse('specify the two channels and the time: channels = ["t1_C", "t2_C"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
         """Exchange the values."""

@@ -16,9 +16,9 @@ from thermocomp.recordings.recording import Recording
 ROUNDED = 0.5
 #: error message for a recording or a column whose state of compensation is unknown
 UNKNOWN = (
-    "compensation: unknown: nobody knows which correction was in force while it was measured, so it does not tell what "
-    "the machine does by itself; record with a controller that confirms its corrections and with its own temperature "
-    'compensation off. If none was in force, say compensation = "off" in a mapping'
+    "compensation: unknown: the correction in force during the measurement is not known, so the uncompensated "
+    "deviation is not known either; record with a controller that confirms its corrections and with its own "
+    'temperature compensation off. If no correction was in force, set compensation = "off" in a mapping'
 )
 
 

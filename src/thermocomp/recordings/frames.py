@@ -28,7 +28,7 @@ def parts_of(
         if column not in columns:
             raise InputError(f"{name}: units: no column is named {column!r}; there are {', '.join(columns)}")
     if not len(table):
-        raise RecordingError(f"{name}: the table has no row")
+        raise RecordingError(f"{name}: the table has no rows; a recording needs at least one")
     plain = table.set_axis(columns, axis=1)
     labelled = cycles if isinstance(cycles, str) else "cycle" if cycles is None and "cycle" in columns else None
     if labelled is not None and labelled not in columns:

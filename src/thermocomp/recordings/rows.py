@@ -116,4 +116,7 @@ class Rows:
     def refuse_twins(self, owner: str) -> None:
         """Raise `InputError` unless each row is later than the previous one."""
         if not (np.diff(self.time) > 0).all():
-            raise InputError(f"{self.source}: {owner}: needs a row per instant, and several rows have the same time")
+            raise InputError(
+                f"{self.source}: {owner}: requires one row per time, but several rows have the same time; remove the "
+                "duplicates first"
+            )

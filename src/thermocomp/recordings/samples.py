@@ -54,7 +54,7 @@ class Samples:
     stamps : tuple of str
         ISO timestamp of the first row of each test, or of an earlier file it continues; empty: unknown.
     trouble : tuple of (str, str)
-        Channel (empty: all) and its fault as a whole; see `thermocomp.recordings.checks.sound`.
+        Channel (empty: the whole recording) and its persistent fault; see `thermocomp.recordings.checks.sound`.
     """
 
     inputs: tuple[Channel, ...]
@@ -102,7 +102,10 @@ class Samples:
             rows = np.flatnonzero((self.test == k) & self.valid)
             if rows.size == 0:
                 names = ", ".join(c.name for c in self.inputs)
-                raise RecordingError(f"{self.test_names[k]}: no row has a number in all of the inputs {names}")
+                raise RecordingError(
+                    f"{self.test_names[k]}: no row has a number in all of the inputs {names}; leave out inputs without "
+                    "values"
+                )
             count, _ = first_rows(self.zeroing, self.time[rows], self.stands[rows])
             zero[k] = np.where(self.rezeroed, robust_mean(self.values[rows[:count]]), 0.0)
         return zero

@@ -18,9 +18,9 @@ from thermocomp.recordings.starts import Start, bridge_files, find_resting_rows,
 NO_INPUTS = {
     "displacement": "a machine in production has no displacement probe",
     "angle": "a machine in production has no probe for angles",
-    "position": "thermocomp position fits errors that depend on it",
+    "position": "use thermocomp position for errors that depend on it",
     "residual": "a machine in production has no displacement probe",
-    "correction": "it is what a model makes, not what it is made of",
+    "correction": "it is the output of a model, not an input",
 }
 #: upper bound of any temperature, speed or displacement of a machine, in any unit
 ABSURD = 1e9
@@ -100,8 +100,8 @@ def _chosen_channels(
     for c in target_channels:
         if c.quantity not in ("displacement", "angle"):
             raise InputError(
-                f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle; "
-                f"head it drift_{c.unit} or name it in a mapping if it is one"
+                f"target {c.name} measures {c.quantity}: a target must be a displacement or an angle; if it is one, "
+                f"name its column drift_{c.unit} or map it"
             )
     if inputs is None:
         speed = first.speed

@@ -18,9 +18,9 @@ Word = Literal["cold", "continued", "rezeroed", "known"]
 #: description of each initial state, for tables and errors
 WORDS: dict[Word, str] = {
     "cold": "zeroed at rest at its start",
-    "continued": "continues from an earlier file, and counts from the zero of that",
-    "rezeroed": "displacements and temperatures count from its start, on a machine that may be warm",
-    "known": "counts from a zero that is known",
+    "continued": "continues from an earlier file, and uses the zero of that file",
+    "rezeroed": "displacements and temperatures are relative to its start, on a machine that may be warm",
+    "known": "uses a known zero",
 }
 #: a displacement whose initial value is smaller than this was zeroed there [um or urad]
 NEAR = 3.0
@@ -60,7 +60,7 @@ class Start:
     >>> from thermocomp import Start, simulate
     >>> (monday,) = simulate("hwang")
     >>> print(Start("continued", earlier=(monday,), gap=600.0).told("tuesday"))  # starts=... of compare, fit, assess
-    tuesday: continued from hwang (continues from an earlier file, and counts from the zero of that); stated
+    tuesday: continued from hwang (continues from an earlier file, and uses the zero of that file); stated
     >>> Start("known", zero={"t_bed_front_C": 20.0}).content("tuesday")["zero_degC"]
     {'t_bed_front_C': 20.0}
     """
@@ -94,7 +94,7 @@ class Start:
         }
 
     def told(self, name: str) -> str:
-        """Return it as text, such as ``b: continued from a (continues from an earlier file ...); stated``."""
+        """Return the state as text, such as ``b: continued from a (continues from an earlier file ...); stated``."""
         names = ", ".join(r.name for r in self.earlier)
         before = f" from {names}" if self.word == "continued" else ""
         after = f"; what went before: {names}" if self.earlier and not before else ""
@@ -124,7 +124,8 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
             gap, how = before.sampling_interval, "taken as one sampling interval: neither stamped nor stated"
         if not gap > 0:
             raise InputError(
-                f"{after.name} cannot continue {before.name}: by their time stamps it begins {-gap:g} s before its end"
+                f"{after.name} cannot continue {before.name}: by their time stamps it begins {-gap:g} s before the end "
+                f"of {before.name}"
             )
         begins.append(begins[-1] + float(before.time[-1]) + gap)
         words.append(f"{after.name} begins {gap:g} s after the end of {before.name} ({how})")
@@ -145,7 +146,7 @@ def find_starts(
     file (by time stamps), the test continues that file. Other cases are undetermined.
     """
     if absolute:
-        return tuple(Start("known", "temperatures are taken as they are") for _ in recordings)
+        return tuple(Start("known", "temperatures are absolute") for _ in recordings)
     found = {id(r): _found(r, [o for o in recordings if o is not r], targets, zeroing) for r in recordings}
 
     def whole(start: Start) -> Start:
@@ -188,7 +189,7 @@ def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[
             abs(level(before, c.name, zeroing, end=True)) > _tolerance(before, c.name) for c in targets
         ):
             return Start("rezeroed", f"it follows {before.name} by its time stamps, and begins near zero again")
-        return Start("cold", "taken so: what is measured begins near zero")
+        return Start("cold", "assumed, since the displacements begin near zero")
     if before is not None and all(
         abs(level(before, n, zeroing, end=True) - levels[n]) <= max(_tolerance(recording, n), _tolerance(before, n))
         for n in far
@@ -198,8 +199,8 @@ def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[
     raise InputError(
         f"{recording.source or recording.name}: {name} begins at {levels[name]:.1f} {far[name].unit}, so it was not "
         "zeroed at the start of this file. Specify its start: --continues EARLIER (the file before it), --start "
-        "rezeroed (count from its start), --start known --zero FILE or t1_C=20.1,t2_C=20.4 (the temperatures of its "
-        "zero), or --start cold if it was zeroed at rest all the same. In Python: starts=Start(...)"
+        "rezeroed (relative to its start), --start known --zero FILE or t1_C=20.1,t2_C=20.4 (the temperatures of its "
+        "zero), or --start cold if it was nevertheless zeroed at rest. In Python: starts=Start(...)"
     )
 
 

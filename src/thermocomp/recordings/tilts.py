@@ -31,7 +31,7 @@ def with_tilts(tests: Sequence[Recording], tilts: Sequence[str]) -> tuple[list[R
             raise InputError(f"--tilt {text!r}: the distance must be positive")
         for k, test in enumerate(found):
             if name in test.table.columns:
-                raise InputError(f"{test.name}: there is a channel {name!r} already: choose another name for the tilt")
+                raise InputError(f"{test.name}: a channel {name!r} already exists: choose another name for the tilt")
             tip, spindle = (test.channel(part) for part in parts[:2])
             for probe in (tip, spindle):
                 if probe.quantity != "displacement":

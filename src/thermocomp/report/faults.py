@@ -37,7 +37,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     if not logs:
         known = any(m.watch is not None for m in judged.models)
         why = (
-            "the recordings do not contain what the watch needs"
+            "the recordings lack inputs that the watch needs"
             if known
             else "the model file contains no watch; fit the model again"
         )
@@ -57,14 +57,14 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     cautions = []
     for model, a in zip(judged.models, judged.overall(), strict=True):
         if costs := find_costs(model, a, logs):
-            parts.append(_cost_table(f"{a.target}: what it cost", model.unit, costs))
+            parts.append(_cost_table(f"{a.target}: loss of accuracy", model.unit, costs))
         cautions += [_held_words(a.target, model.unit, c) for c in costs if not c.runs_on]
     if cautions:
         limits = judged.overall()[0].limits or Limits()
         parts.append(
             "Held, then fades: without these sensors the model was never judged, or does harm. The correction stays "
-            f"for {limits.hold / 60:g} min, then goes to zero with a time constant of {limits.fade / 3600:g} h: that "
-            "is what is judged here and above."
+            f"for {limits.hold / 60:g} min, then goes to zero with a time constant of {limits.fade / 3600:g} h: the "
+            "results here and above include this."
         )
     return Section(TITLE, parts, cautions)
 
@@ -180,28 +180,28 @@ def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
 def _timeline_words(log: FaultLog, logs: Sequence[FaultLog]) -> str:
     good = len(log.watch.names) - len(log.failed)
     others = [other.name for other in logs if not other.faults]
-    more = f" In {', '.join(others)} none did." if others else ""
+    more = f" In {', '.join(others)} none failed." if others else ""
     return (
-        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperatures failed, {good} did not; coloured where "
-        f"one was not believed, from the instant on at which that was found.{more}"
+        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperatures failed, {good} did not; coloured while "
+        f"one was not trusted, from the time of detection.{more}"
     )
 
 
 def _stand_in_words(log: FaultLog) -> str:
     more = f" Not drawn: {', '.join(log.failed[MOST:])}." if len(log.failed) > MOST else ""
     return (
-        "What stood in begins where the sensor was, and moves over to its prediction from the others and the speed "
-        f"with a time constant of an hour.{more}"
+        "The substitute value starts at the last value of the sensor, and approaches its prediction from the other "
+        f"sensors and the speed with a time constant of an hour.{more}"
     )
 
 
 def _fault_table(log: FaultLog, recording: Recording) -> Layout:
     columns = (
         Column("sensor", lambda f: f.sensor),
-        Column("it was", lambda f: f.word),
+        Column("fault", lambda f: f.word),
         Column("found", lambda f: _when(f.begin, recording), ">"),
         Column("until", lambda f: _when(f.end, recording) if f.returned else "the end", ">"),
-        Column("reading minus what stood in, mean", lambda f: f.beside, "um", "degC"),
+        Column("reading minus substitute, mean", lambda f: f.beside, "um", "degC"),
     )
     more = len(log.faults) - ROWS
     note = f"{more} more are not listed." if more > 0 else ""

@@ -52,7 +52,7 @@ def measured(recording: Recording) -> Drawn:
                     free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
             (rest[0], recording.temperatures, "degC", "temperatures"),
-            (rest[1], recording.displacements, "um", "displacements: what a part would be wrong by"),
+            (rest[1], recording.displacements, "um", "displacements: error of a part"),
         ):
             for k, c in enumerate(channels):
                 ax.plot(*thin_points(hours, recording.table[c.name].to_numpy()), **line_style(k), label=c.name)
@@ -68,7 +68,7 @@ def measured(recording: Recording) -> Drawn:
 
 
 def overview(comparison: Comparison) -> Drawn:
-    """Plot the RMS of all models on unseen blocks, compared with no compensation; hollow dots are refused."""
+    """Plot the RMS of all models on unseen blocks, compared with no compensation; hollow dots are refused models."""
     overall = comparison.overall()
     targets = list(dict.fromkeys(a.target for a in overall))
     models = list(dict.fromkeys(a.model for a in overall))
@@ -153,7 +153,7 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
 
 
 def robustness(comparison: Comparison, model: str) -> Drawn:
-    """Plot the effect of noise and of a lost sensor: RMS clean, with noise, and with each sensor cut off."""
+    """Plot the effect of noise and of a lost sensor: RMS undisturbed, with noise, and with each sensor lost."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
     with drawing("robustness" + model):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
@@ -182,7 +182,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         ax.plot([], [], "o", color=PREDICTED, label="clean")
         ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
         ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
-        ax.plot([], [], "|", color=RESIDUAL, label="one sensor cut off")
+        ax.plot([], [], "|", color=RESIDUAL, label="one sensor lost")
         ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
         log_ticks(ax, "x")
         name_ticks(ax.yaxis, [a.target for a in found])

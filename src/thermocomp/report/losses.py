@@ -7,7 +7,7 @@ from thermocomp.core.model import ErrorModel
 
 
 def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
-    """Yield lines about watched models: the effect of each lost sensor, and sensors that are watched poorly."""
+    """Yield lines about watched models: the effect of each lost sensor, and sensors that are monitored poorly."""
     watch = next((m.watch for m in models if m.watch is not None), None)
     if watch is None:
         return
@@ -32,8 +32,8 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
     if dear:
         yield (
-            f"A spare sensor is recommended for {', '.join(dear)}: without it a correction is held, or leaves over "
-            f"{DEAR:g} times its error"
+            f"A spare sensor is recommended for {', '.join(dear)}: without it a correction is held, or its error is "
+            f"over {DEAR:g} times as large"
         )
     blind = [f"{n} ({s.off:.1f} degC)" for n, s in zip(watch.names, watch.sensors, strict=True) if s.off > FAR]
     if blind:

@@ -66,7 +66,7 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
     if not rooms:
         ax.text(0.5, 0.5, "no temperature of\nthe room was recorded", transform=ax.transAxes, ha="center", fontsize=8)
     if plan.swing:
-        ax.axhline(plan.swing, color=NONE, ls="--", lw=0.8, label=f"reckoned with: {plan.swing:g} degC")
+        ax.axhline(plan.swing, color=NONE, ls="--", lw=0.8, label=f"assumed: {plan.swing:g} degC")
     if plan.candidates[0].trial.kind == "room":
         ax.plot(len(rooms) + 1, plan.swing, label="next test", **_STAR)
     ax.set_xticks(range(1, 1 + len(rooms)) if len(rooms) <= 12 else [1, len(rooms)])
@@ -85,7 +85,7 @@ def _draw_tests(ax: Axes, plan: Plan) -> None:
     name_ticks(ax.yaxis, [c.trial.words for c in plan.candidates], fontsize=7)
     ax.invert_yaxis()
     ax.set_axisbelow(True)
-    ax.set_xlabel("expected to take off the error [um]")
+    ax.set_xlabel("expected reduction of the error [um]")
     ax.set_title(f"next test (expected error now {plan.expected:.2f} um)")
 
 
@@ -98,9 +98,9 @@ def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
     ax.errorbar(learned, rms, [x.error for x in levels], fmt="none", ecolor=PREDICTED, capsize=2)
     ax.axhline(curve.none, color="#999999", ls="--", lw=0.8, label="no compensation")
     ax.set_ylim(bottom=0)
-    ax.set_xlabel("thermal cycles learned from")
+    ax.set_xlabel("training cycles")
     ax.set_ylabel("error on an unseen cycle [um RMS]")
-    ax.set_title("how much is enough")
+    ax.set_title("learning curve")
     add_legend(ax)
 
 
@@ -113,7 +113,7 @@ def _finish(ax: Axes, plan: Plan, title: str, what: str, room: float = 0.1) -> N
     best = plan.candidates[0].trial
     if best.kind != "room":
         near = SAME * plan.top_speed
-        ax.axvspan(best.speed - near, best.speed + near, color=SHADE, lw=0, zorder=0, label="counts as its speed")
+        ax.axvspan(best.speed - near, best.speed + near, color=SHADE, lw=0, zorder=0, label="treated as the same speed")
     ax.axvline(plan.top_speed, color=NONE, ls=":", lw=0.8)
     ax.set_xlim(0, (1.0 + SAME) * plan.top_speed)
     ax.set_ylim(0, (1.0 + room) * ax.get_ylim()[1])

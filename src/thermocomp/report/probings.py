@@ -20,7 +20,7 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
         if (probed := a.probed) is None:
             continue
         if (after := a.metric("max_abs")) > (before := a.unprobed_metric("max_abs")):
-            yield f"{a.target}: its largest error grows with them, from {before:.2f} to {after:.2f} um"
+            yield f"{a.target}: its largest error increases with the probings, from {before:.2f} to {after:.2f} um"
         held = " by the probings alone, each held until the next"
         ways = {"": a.metric, " without": a.unprobed_metric, held: a.held_metric}
         left = "; ".join(f"{find('rms'):.2f} and {find('mae'):.2f}{words}" for words, find in ways.items())
@@ -35,7 +35,7 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
     if not probed:
         return None
     shown = Shown(
-        draw_shifts(probed, recordings), "What a probing said at its instant, and what was added from then on."
+        draw_shifts(probed, recordings), "Error of the model at each probing, and the shift added from then on."
     )
     return Section("Probings", [shown, *describe_probings(probed)])
 

@@ -9,7 +9,7 @@ MOST = 4
 
 
 def describe_running(assessments: Sequence[Assessment]) -> list[str]:
-    """Return the effect of the compensator around the models on the results."""
+    """Return the effect of the compensator's gate and limits on the results."""
     judged = [a for a in assessments if a.alone is not None and not a.failure]
     limited = [a for a in judged if a.limits is not None]
     lines = []

@@ -18,10 +18,10 @@ TITLE = 80
 
 #: value plotted for the other methods: the first of these columns in the table, and its caption
 TOLD = {
-    "RMS left out [um]": "Each number of sensors with its best set: what is left of thermal cycles that are left out.",
-    "MSE_p [um^2]": "Each number of sensors with its best set: residual mean square.",
-    "R2": "The steps from top to bottom: share of the error's variance that is not explained after each.",
-    "mean Psi": "Sets of sensors: how far their maximal correlation with the error stays below 1.",
+    "RMS on left-out cycles [um]": "Best set of each number of sensors: residual on left-out thermal cycles.",
+    "MSE_p [um^2]": "Best set of each number of sensors: residual mean square.",
+    "R2": "Steps from top to bottom: unexplained share of the variance of the error after each step.",
+    "mean Psi": "Sets of sensors: difference between 1 and their maximal correlation with the error.",
 }
 
 
@@ -30,12 +30,12 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     found = choice.details
     if isinstance(found, Budget):
         return budget(found), (
-            "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: enough, for what "
-            "more sensors bring is within the margin of the rule. Condition: collinearity of the sensors."
+            "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: sufficient, the "
+            "gain of more sensors is within the margin of the rule. Condition: collinearity of the sensors."
         )
     if choice.method == "grouping" and found is not None:
         return grouping(found, choice.target), (
-            "Left: correlation of every two temperatures, those of a group side by side and framed; names of "
+            "Left: correlation of each pair of temperatures, with the groups in sequence and framed; names of "
             "representatives are bold. Right: the best subset of each number of representatives."
         )
     # Wessel's ranked sets follow the best set for each displacement
@@ -43,7 +43,7 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
         for word, caption in TOLD.items():
             shown = [j for j, heading in enumerate(table.columns) if heading.startswith(word)]
             if shown and table.rows and "displacement" not in table.columns:
-                return rows(table, shown[0], choice.target), f"{caption} Full: what was chosen."
+                return rows(table, shown[0], choice.target), f"{caption} Filled: selected."
     return None
 
 
@@ -130,7 +130,7 @@ def budget(b: Budget) -> Drawn:
         everything, colour = b.mean()[shown, -1], COLOURS[shown % len(COLOURS)]
         errors.axhline(everything, color=colour, ls=":", label=f"{b.models[shown]}, all {names[-1]} temperatures")
         errors.plot([], [], ".", color="#888", label=f"one unseen block{mean}")
-        errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="enough: more is not clearly better")
+        errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="sufficient: more is not clearly better")
         log_ticks(errors, "y")
         errors.set_ylabel(f"RMS unseen [{b.unit}]")
         names_of = ", ".join(b.targets)
@@ -148,14 +148,14 @@ def budget(b: Budget) -> Drawn:
         for size, sensors in zip(sizes, b.sensors, strict=True):
             rows = [b.candidates.index(s) for s in sensors]
             chosen.plot([size] * len(rows), rows, "o", color=COLOURS[1], ms=3)
-        chosen.plot([], [], "o", color=COLOURS[1], ms=3, label="chosen in all rows")
+        chosen.plot([], [], "o", color=COLOURS[1], ms=3, label="selected on all rows")
         chosen.plot(
             [],
             [],
             "s",
             color="#08306b",
             ms=6,
-            label="without any one block (lighter: some)",
+            label="selected in all splits (lighter: in some)",
         )
         add_legend(chosen, **BESIDE)
         chosen.set_xlabel("number of temperature sensors")

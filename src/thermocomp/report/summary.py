@@ -71,7 +71,7 @@ def verdict(comparison: Comparison) -> str:
         by_model.setdefault(a.model, []).append(t)
     who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
-    text = f"Use {who}: where the models had not learned, the RMS falls from {_span(without)} to {_span(with_)} um"
+    text = f"Use {who}: on unseen data, the RMS falls from {_span(without)} to {_span(with_)} um"
     if left:
         text += f"; no model passed for {_list(left)}"
     return text + "."
@@ -118,7 +118,7 @@ def harms(comparison: Comparison) -> list[str]:
 def describe_unlike(r: Robustness) -> str:
     """Return the fraction of rows outside the joint support and the error there, as text."""
     return (
-        f"{100 * r.unlike:.0f} % of the rows are unlike the training (inputs together, or a speed between trained "
+        f"{100 * r.unlike:.0f} % of the rows are unlike the training data (inputs together, or a speed between trained "
         f"ones), {r.unlike_rms:.2f} um RMS there"
     )
 

@@ -49,13 +49,13 @@ class MachiningCentre:
 
     Structure ``w X' b Z Y (C1) t``: the table moves along X on the bed's front, the column along Z on its rear, the
     headstock along Y on the column's front, the spindle points towards -Z. Right is +X, front is -Z. Time constants
-    from half a minute (bearings) to days (foundation); heat that is nonlinear in speed and temperature; hysteresis by
-    the chiller's thermostat and by friction under the column.
+    from half a minute (bearings) to days (foundation); heat that is nonlinear in speed and temperature; hysteresis due
+    to the chiller's thermostat and to friction under the column.
 
     Parameters
     ----------
     model : ReducedModel
-        Model of spindle, column, bed and screws by finite elements, and of the other parts as lumps.
+        Finite-element model of spindle, column, bed and screws; the other parts are lumped masses.
     longest_step : float
         Longest interval between updates of friction and thermostat [s].
     """
@@ -85,7 +85,7 @@ class MachiningCentre:
     def run(
         self, state: CentreState, drives: Sequence[FeedDrive], air: FloatArray, dt: float
     ) -> tuple[CentreState, Truth]:
-        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
+        """Advance by one step of `dt` for each item of `drives`, in equal parts no longer than `longest_step`.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class MachiningCentre:
     def _advance(
         self, now: FloatArray, chilling: bool, drive: FeedDrive, air: FloatArray, dt: float, fields: FloatArray
     ) -> bool:
-        """Fill in the fields after each step of one drive; return whether the chiller runs at the end of it."""
+        """Fill in the fields after each step with one drive; return whether the chiller runs after the last step."""
         self._check(drive)
         heat = self.heat
         operators = self.model.operators(self._theta(drive), dt, self._watched)

@@ -24,16 +24,16 @@ class Climate:
     daily : float
         Amplitude of the daily cycle; maximum at 15 h [K].
     wander : float
-        Standard deviation of the fluctuations by weather, doors and neighbouring machines [K].
+        Standard deviation of the fluctuations due to weather, doors and neighbouring machines [K].
     memory : float
         Time constant of these fluctuations [s].
     layers : float
-        Mean rise with height; it fluctuates and follows the daily cycle [K/m].
+        Mean temperature rise with height; it fluctuates and follows the daily cycle [K/m].
     sun : float
-        Rise from left to right at noon, in daylight only [K/m].
+        Temperature rise from left to right at noon, in daylight only [K/m].
     draught : float
-        Standard deviation of the fluctuations of the lateral gradient by doors, with a third of the time constant
-        [K/m].
+        Standard deviation of the fluctuations of the lateral gradient due to open doors, with a third of the time
+        constant [K/m].
     begin : float
         Time of day at the start, from midnight [s].
     """

@@ -38,9 +38,9 @@ class Face:
     lying : bool
         Cylinder with a horizontal axis, which may rotate.
     wind : float
-        Forced convection at top speed from neighbouring rotating parts, proportional to its power 2/3 [W/(m2 K)].
+        Forced convection from neighbouring rotating parts at top speed; proportional to speed^(2/3) [W/(m2 K)].
     films_turning : float
-        Addition of the linear model to `films` at top speed [W/(m2 K)].
+        Increase of `films` in the linear model at top speed [W/(m2 K)].
     """
 
     area: float

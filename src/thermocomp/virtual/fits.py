@@ -34,7 +34,7 @@ class Fit:
     length : float
         Length of the joint [mm].
     squeeze : float
-        Interference in radius at 20 degC; negative: a gap [um].
+        Radial interference at 20 degC; negative: a gap [um].
     linear : float
         Conductance of the joint in the linear model [W/(m2 K)].
     expansion : tuple of float
@@ -83,7 +83,7 @@ class Fit:
         return 1e3 * self.radius * inner, 1e3 * self.radius * outer
 
     def squeezed(self, inner: ArrayLike, outer: ArrayLike) -> FloatArray:
-        """Return the interference in radius at two temperatures [degC]; negative: a gap [um]."""
+        """Return the radial interference at two temperatures [degC]; negative: a gap [um]."""
         grown = [
             a * (np.asarray(t) - REFERENCE_TEMPERATURE) for a, t in zip(self.expansion, (inner, outer), strict=True)
         ]

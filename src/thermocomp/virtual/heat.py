@@ -142,7 +142,7 @@ def swept(stroke: tuple[float, float], travel: float) -> list[float]:
     Parameters
     ----------
     stroke : tuple of float
-        Start and end of the stroke [mm]; equal for a movement on the spot.
+        Start and end of the stroke [mm]; equal for an oscillation at one point.
     travel : float
         [mm], from 0
     """

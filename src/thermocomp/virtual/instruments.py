@@ -115,7 +115,8 @@ class Touch:
 
     Each point gives three channels, ``x_LABEL_um``, ``y_LABEL_um`` and ``z_LABEL_um``: the deviation of the tool point
     since the start, actual minus commanded; a spindle that grows towards the artefact gives a negative z. Between two
-    cycles they have no value. A cycle that is due while the spindle rotates waits until it has stopped.
+    cycles the channels have no value. A cycle that is due while the spindle rotates waits until the spindle has
+    stopped.
 
     Parameters
     ----------

@@ -110,7 +110,9 @@ class Kit:
     def place(self, name: str, *, perfect: bool) -> str:
         """Return the description of a temperature place."""
         if name in self.inner and not perfect:
-            raise SettingError(f"{name!r} is a rotation: it can only be calculated, with perfect = true")
+            raise SettingError(
+                f"{name!r} is on a rotating part: its temperature can only be calculated, with perfect = true"
+            )
         known = {**self.places, **self.inner} if perfect else self.places
         if name not in known:
             raise explain_unknown("place", name, [*known, *self.outfits])
@@ -211,8 +213,8 @@ CENTRE = Kit(
         "squareness": tuple(SQUARENESS),
     },
     loads={
-        "tool_tip": "cutting edge: what of the cutting power goes into the tool",
-        "coolant": "coolant tank; negative: taken from it",
+        "tool_tip": "cutting edge: share of the cutting power that enters the tool",
+        "coolant": "coolant tank; negative: heat removed",
         "cabinet": "electric cabinet, on the column's rear",
         "hydraulics": "hydraulic unit, at the bed's rear",
         **{f"{a}_bearing": f"motor and bearing of the {a.upper()} screw" for a in AXES},

@@ -86,7 +86,7 @@ class AngularContact:
 
     @property
     def mounted(self) -> float:
-        """Mean approach of balls and rings by the preload at 20 degC, normal to the contact (Palmgren) [um]."""
+        """Mean approach of balls and rings under the preload at 20 degC, normal to the contact (Palmgren) [um]."""
         load = self.preload / (self.balls * math.sin(math.radians(self.angle)))
         single = 0.436 * math.pow(load**2 / self.ball, 1 / 3)
         return single * (1.0 + 1.0 / self._unlike) / 2.0

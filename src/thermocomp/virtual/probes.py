@@ -215,7 +215,7 @@ def swing(along: str, way: FloatArray) -> list[tuple[str, float]]:
 
 
 def make_squareness_probe(code: str) -> VirtualProbe:
-    """Return the squareness of two axes at 20 degC, by an artefact; thermal changes are in straightness readings."""
+    """Return a probe of the squareness of two axes at 20 degC; straightness readings contain the thermal changes."""
     return VirtualProbe(
         place=f"{code}: squareness at 20 degC, artefact",
         reads={},

@@ -114,7 +114,7 @@ class Programme(RecordingSetup):
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest(RecordingSetup, Stretch):
-    """A test, or several alike, as written in a protocol; with the settings of `RecordingSetup` and `Stretch`.
+    """A test, or several of a kind, as written in a protocol; with the settings of `RecordingSetup` and `Stretch`.
 
     Parameters
     ----------

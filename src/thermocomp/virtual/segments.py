@@ -1,4 +1,4 @@
-"""Components of a test: segments, and the values drawn at random by a seed."""
+"""Components of a test: segments, and the values drawn at random from a seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -55,7 +55,7 @@ class Lot:
             raise SettingError("write either one_of = [...], or between = [lowest, highest] and step")
         low, high = self.between
         if not (self.step > 0 and high > low) or abs(self._steps - round(self._steps)) > 1e-9:
-            raise SettingError("from the lowest to the highest there must be a whole number of steps")
+            raise SettingError("the range from lowest to highest must be a whole number of steps")
         if self._steps > MOST_VALUES:
             raise SettingError(
                 f"{self._steps:.3g} values to draw from, but at most {MOST_VALUES} are supported: use a larger step"

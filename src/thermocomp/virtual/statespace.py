@@ -1,4 +1,4 @@
-"""A machine reduced to a small state-space model: plain numbers with steps of microseconds of computing time."""
+"""A machine reduced to a small state-space model in plain numbers, with microseconds of computing time per step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

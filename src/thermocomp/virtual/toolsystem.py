@@ -75,7 +75,7 @@ class RestingTool:
         return ToolState(state, self._wish(self._linear(state[None])).item())
 
     def run(self, state: ToolState, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
-        """Advance by one step of `dt` per drive, each in equal parts no longer than `longest_step`.
+        """Advance by one step of `dt` for each item of `drives`, in equal parts no longer than `longest_step`.
 
         Parameters
         ----------

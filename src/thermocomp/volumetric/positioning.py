@@ -23,7 +23,8 @@ class Positioning:
     positions : ndarray of shape (n_targets,)
         Target positions, increasing [mm].
     up : ndarray of shape (n_runs, n_targets)
-        Deviations, actual minus target, for approaches in the positive direction [unit]; no repeatability from one run.
+        Deviations, actual minus target, for approaches in the positive direction [unit]; one run gives no
+        repeatability.
     down : ndarray of shape (n_runs, n_targets) or None
         The same in the negative direction; None for a unidirectional test. A unidirectional test in the negative
         direction has `up` = None.

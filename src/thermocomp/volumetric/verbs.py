@@ -92,8 +92,8 @@ def position(
 ) -> Positioned:
     """Fit position-dependent errors: cold profiles and thermal slopes, judged on unseen data.
 
-    Settings that are not given are determined from the profiles, and again wherever a part is left out: the useful
-    number of slopes, whether the profile shifts as a whole, and the position about which it tilts.
+    Settings that are not given are determined from the profiles, and again for each part of the data left out: the
+    useful number of slopes, whether the profile shifts as a whole, and the position about which it tilts.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def volumetric(
     Parameters
     ----------
     machine : Machine, str or Path
-        Machine file (.toml): axes, and known ones of the 32 error components.
+        Machine file (.toml): axes, and the known error components (of 32).
     recording : Recording, path or DataFrame, optional
         CSV, XLSX or Parquet file to replay through the models of the machine. Default: the machine in its reference
         state, with its constants and profiles only.

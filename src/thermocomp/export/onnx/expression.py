@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from thermocomp.core import expression as e
-from thermocomp.export.onnx.nodes import Graph
 from thermocomp.core.recurrences import Clock
+from thermocomp.export.onnx.nodes import Graph
 
 #: largest number of ticks in one call (0.6 s of computing time): a model with roots below 0.9997 has settled by then
 MOST_TICKS = 100_000

@@ -127,7 +127,7 @@ def profiles(test: ThermalTest, number: int) -> str:
                 row = int(np.argmin(np.abs(time - moment)))
                 ax.plot(targets.positions, [v[row] for v in curves], "-o", ms=3.5, color=colour, label=label)
             ax.set_xlabel(f"{targets.axis} [mm]")
-            ax.set_title("measured, since the start of the test" if what == "course" else "what the model leaves")
+            ax.set_title("measured, since the start of the test" if what == "course" else "residual with the model")
         panels[0].set_ylabel(f"error of {targets.axis} [um]")
         add_legend(panels[-1], **_BESIDE)
         return svg(figure)

@@ -174,7 +174,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         its effect is proposed.
     """
     if not 0 <= swing <= 50:
-        raise InputError(f"a room that changes by {swing:g} degC: expected 0 to 50 degC")
+        raise InputError(f"a change of the room temperature by {swing:g} degC: expected 0 to 50 degC")
     doubt = find_doubt(samples)
     recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
     if not recorded:
@@ -205,7 +205,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
 def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> FloatArray:
     """Return rows with the mean square of all spindle tests of the grid with a changing room temperature.
 
-    The room temperature rises as often as it falls, so that its contribution adds in the square.
+    The room temperature rises as often as it falls, so that the squares of both contributions are added.
     """
     spindle = [f for t, f in zip(grid, tables, strict=True) if t.kind != "room"]
     room = [f for t, f in zip(grid, tables, strict=True) if t.kind == "room"]

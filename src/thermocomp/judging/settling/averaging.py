@@ -39,7 +39,7 @@ class Noise:
     inflation : float
         Standard error of a mean over the window, relative to that of the same number of independent rows; at least 1.
     resolution : float
-        Smallest difference between two values; averaging does not get below its standard uncertainty.
+        Smallest difference between two values; without noise, the standard uncertainty that it causes remains.
     window : float
         Averaging time [s].
     moves : bool
@@ -201,7 +201,7 @@ def _scatter_of_means(parts: Sequence[FloatArray]) -> float:
 
 
 def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
-    """Return whether means differ, last third from first third or any two, beyond their standard errors."""
+    """Return whether the last and first third of the means, or any two, differ by more than their standard errors."""
     third = max(1, len(means) // 3)
     rise = abs(float(means[-third:].mean() - means[:third].mean())) / np.sqrt(2.0 / third)
     span = float(np.ptp(means)) / np.sqrt(2.0)
@@ -215,7 +215,7 @@ def _moves(means: FloatArray, white: float, rows: int, own: float) -> bool:
 
 
 def zero_of(time: FloatArray, values: FloatArray, noise: Noise, *, rests: bool = True) -> Zero:
-    """Return the state at the last of the rows given, from the rows in the window before it.
+    """Return the reference state at the last given row, from the rows in the window before it.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def average_curve(time: FloatArray, values: FloatArray, noise: Noise) -> tuple[F
 
 
 def _line(t: FloatArray, y: FloatArray, noise: Noise, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the straight line through the rows given, and its standard uncertainty, at other times."""
+    """Return the values of a straight line through the given rows at other times, and their standard uncertainty."""
     centre, away = t.mean(), at - t.mean()
     spread = float(((t - centre) ** 2).sum())
     slope = float(((t - centre) * (y - y.mean())).sum() / spread)

@@ -20,7 +20,7 @@ class Exponential:
     amplitude, tau : float
         [unit of the channel], [s].
     amplitude_error, tau_error : float
-        Standard errors of the two.
+        Standard errors of amplitude and time constant.
     """
 
     amplitude: float
@@ -104,7 +104,7 @@ def fit(t: FloatArray, y: FloatArray) -> tuple[ExponentialFit | None, Exponentia
 def _least_squares(
     t: FloatArray, y: FloatArray, starts: list[tuple[float, ...]], bounds: tuple[float, float]
 ) -> ExponentialFit | None:
-    """Fit exponentials; each start has one logarithm of a time constant per exponential."""
+    """Fit exponentials; each of `starts` holds the logarithm of one time constant per exponential."""
     k = len(starts[0])
     if len(y) < 2 * k + 3:
         return None

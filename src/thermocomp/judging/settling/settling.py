@@ -63,17 +63,16 @@ class Settling:
     moves : bool
         The averages differ by more than their noise; see `thermocomp.judging.settling.averaging.Noise`.
     clear : bool
-        They differ by at least `CLEAR` times the standard uncertainty of `change`; otherwise no times are read and
-        nothing is fitted.
+        `change` is at least `CLEAR` times its standard uncertainty; otherwise no times are read and nothing is fitted.
     returns : bool
-        It ends closer to its start than to its extreme: no single time describes it.
+        The channel ends closer to its initial value than to its extreme: no single time describes it.
     overshoots : bool
-        It exceeds its last value by more than a tenth of its change, and then settles back: the time at which 90 %
-        are first reached is then not a settling time, so no times are reported.
+        The channel exceeds its last value by more than a tenth of its change, and then settles back: the time at which
+        90 % are first reached is then not a settling time, so no times are reported.
     settled : bool
-        Over the last quarter of the phase it stays within `SETTLED` of its change about its last value, and a straight
-        line through it rises by no more; noise is allowed for. By this rule an exponential is settled after 3.3 time
-        constants, 4 % before its final value.
+        Over the last quarter of the phase the channel stays within `SETTLED` of its change about its last value, and a
+        straight line through it rises by no more; noise is allowed for. By this rule an exponential is settled after
+        3.3 time constants, 4 % before its final value.
     t63, t90 : float
         Times since the start at which 63.2 % and 90 % of the change up to the end were first reached [s]; if the
         channel has not settled, the true times are longer. nan if it is not clear, returns or overshoots.
@@ -103,7 +102,7 @@ class Settling:
         if not self.moves:
             return "does not move"
         if not self.clear:
-            return "moves too little for a time"
+            return "moves too little to determine a time"
         if self.returns:
             return "comes back"
         if self.overshoots:
@@ -114,7 +113,7 @@ class Settling:
 def find_driven_rows(recording: Recording) -> BoolArray | None:
     """Return the rows in which the spindle turns or an axis moves, (n_rows,); None if neither was recorded.
 
-    The threshold is 2 % of the highest speed or feed. A row without a value counts as the one before it.
+    The threshold is 2 % of the highest speed or feed. A row without a value is treated as the previous row.
     """
     channels = (*recording.of_quantity("spindle_speed"), *recording.of_quantity("feed"))
     if not channels:

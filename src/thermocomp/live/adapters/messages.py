@@ -36,7 +36,7 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
         raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,} are accepted")
     stamp = content.pop("time", None)
     if stamp is not None and _number(stamp) is None:
-        raise ReadingError(f"a message whose time is {escape(stamp, 40)!r}: expected seconds since 1970")
+        raise ReadingError(f"a message with time {escape(stamp, 40)!r}: expected seconds since 1970")
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
     return Reading(arrived if stamp is None else float(stamp), values)
 
@@ -58,12 +58,14 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     wrong += ["id"] * (type(own) not in (str, int) or len(str(own)) > _LONG or ("id" in content and own == ""))
     wrong += ["under_correction"] * (not isinstance(left, bool)) + sorted(content.keys() - _KNOWN)
     if wrong:
-        raise ReadingError(f"a measurement whose {escape(', '.join(wrong), 80)} cannot be used; expected {example}")
+        raise ReadingError(
+            f"a measurement with missing, invalid or unknown keys: {escape(', '.join(wrong), 80)}; expected {example}"
+        )
     if why := explain_unfit(str(target)):
         raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
         raise ReadingError(
-            f"a measurement beyond {_FAR:g} um or mm, or a repeatability below 0: no probe can measure that"
+            f"a measurement with a number beyond {_FAR:g} um or mm, or a repeatability below 0; check the units"
         )
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
@@ -99,7 +101,7 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
         raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; expected {example}")
     for name, value in content.items():
         if why := explain_unfit(name) or (isinstance(value, str) and not _is_text(value) and explain_unfit(value)):
-            raise ReadingError(f"a message with text that cannot be used: {why}")
+            raise ReadingError(f"a message with invalid text: {why}")
     return content
 
 

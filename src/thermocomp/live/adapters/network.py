@@ -39,7 +39,7 @@ class OnBroker:
             raise SettingError(f"port = {self.port}: expected a port from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
-        """Return whether messages published to the topic of `other` are received on this topic, judged by the names."""
+        """Return whether messages published to the topic of `other` arrive on this topic, according to their names."""
         levels, topic = self.topic.split("/"), other.topic.split("/")
         levels = levels[2:] if levels[0] == "$share" else levels
         fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))

@@ -26,7 +26,7 @@ from thermocomp.virtual.protocolfile import read_protocol
 
 @dataclass(kw_only=True)
 class Played:
-    """Rows played back at their times.
+    """Rows of a recording, played back at their times.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class Played:
 
 @dataclass(kw_only=True)
 class ReplaySource(Played):
-    """A recording in thermocomp's own CSV, played back."""
+    """A recording in thermocomp's own CSV format, played back."""
 
     path: Path
 
@@ -176,7 +176,7 @@ class FileSink:
 
 
 def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, None]:
-    """Return time [s] and values by channel of a recording in thermocomp's own CSV, read row by row."""
+    """Return time [s] and values by channel of a recording in thermocomp's own CSV format, row by row."""
     try:
         file = path.open("rb")
     except OSError as e:

@@ -70,7 +70,7 @@ class ReplayIn:
     Parameters
     ----------
     file : str
-        File in thermocomp's own CSV.
+        File in thermocomp's own CSV format.
     """
 
     kind: Literal["replay"]
@@ -109,7 +109,7 @@ class SimulatedProbing:
 
 @dataclass(frozen=True, kw_only=True)
 class LinuxCncOut:
-    """Corrections to a LinuxCNC on this computer.
+    """Corrections for LinuxCNC on this computer.
 
     Parameters
     ----------

@@ -130,14 +130,14 @@ def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
     row, kind = stored.row, kind_of(stored.row)
     if isinstance(row, MeasurementRow):
         known = measured_by(row, reader.starts[stored.run])
-        under = {None: "unknown correction", False: "no correction"}.get(row.compensated, "a correction")
+        under = {None: "an unknown correction", False: "no correction"}.get(row.compensated, "a correction")
         if row.in_force is not None and row.compensated:
             under = f"a correction of {row.in_force.at(row.position):+.2f} um"
         text = f"{row.target} {row.kind} {row.value:+.2f} um under {under}, "
-        text += "in its frame" if row.includes_offset else "not in its frame"
+        text += "included in the value" if row.includes_offset else "not included in the value"
         text += "; the deviation is not known" if known is None else f"; deviation {known:+.2f} um"
         if row.kind != "probing" and row.includes_offset and row.compensated is not False:
-            text += "; the correction is in it, and counts twice while it stays in force"
+            text += "; the correction counts twice while it remains in force"
         return kind, text
     if isinstance(row, StateRow):
         return kind, f"{row.target} {row.word}" + (f": {row.reason}" if row.reason else "")

@@ -1,4 +1,4 @@
-"""`thermocomp linuxcnc`: setup of a LinuxCNC for corrections."""
+"""`thermocomp linuxcnc`: setup of LinuxCNC for corrections."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -29,7 +29,7 @@ def linuxcnc(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Write the files that a LinuxCNC needs for corrections, and list the changes to its configuration.
+    """Write the files that LinuxCNC needs for corrections, and list the changes to its configuration.
 
     Existing files are not changed: a HAL file and a component are written next to the INI file.
 

@@ -1,7 +1,7 @@
 """Journal of a live compensator: readings, demands and corrections in force, resistant to kills and full disks.
 
 Rows wait in memory until `Journal.flush` writes them to the disk in one transaction; then they are confirmed. Disk
-faults raise nothing: rows wait while there is memory for them, and lost rows are counted.
+faults raise no exception: rows wait while there is memory for them, and lost rows are counted.
 """
 
 import os
@@ -93,7 +93,7 @@ class Journal:
         return journal
 
     def add(self, row: Row) -> None:
-        """Queue a row for the next `flush`; an invalid row is counted, and nothing is raised."""
+        """Queue a row for the next `flush`; an invalid row is counted; no exception is raised."""
         try:
             kind, text, time = kind_of(row), dumps(row, self._described), float(row.time)
         except Exception as e:  # noqa: BLE001 - whatever the row, the service continues
@@ -188,7 +188,7 @@ class Journal:
         return found
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:
-        """Return the connection to a file to be continued; None: of a newer version, or set aside."""
+        """Return the connection to a file to be continued; None if it is of a newer version, or was set aside."""
         connection = sqlite3.connect(path, timeout=0.2, isolation_level=None, check_same_thread=False)
         try:
             version = find_version(connection)

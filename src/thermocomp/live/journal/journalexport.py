@@ -193,7 +193,7 @@ def _read(reader: JournalReader, channels: Sequence[Channel], every: float) -> _
         elif isinstance(row, MeasurementRow):
             measured.append((stored.run, row))
     if not time:
-        raise InputError(f"{reader.paths[0]}: the journal holds no reading yet")
+        raise InputError(f"{reader.paths[0]}: the journal contains no reading yet")
     return _Found(
         time=np.array(time),
         run=np.array(run),

@@ -93,9 +93,9 @@ class JournalReader:
                     yield stored
 
     def overtaken(self) -> Callable[[StoredRun], bool]:
-        """Return a predicate for rows whose time was written again later, because a clock was set back.
+        """Return a predicate for rows whose times occur again in later rows, because a clock was set back.
 
-        The later rows are then valid; the earlier ones would be mixed with them.
+        Only the later rows are then valid; the earlier ones must not be mixed with them.
         """
         begins: list[tuple[int, int, float]] = []  # run, row and time at which the clock went back
         last = -math.inf
@@ -225,7 +225,7 @@ def telling(path: Path) -> Iterator[None]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
-    """Open a journal file for reading; None: removed meanwhile, or still empty."""
+    """Open a journal file for reading; None if it was removed meanwhile, or is still empty."""
     # without permission to create files next to it, SQLite reads a file without a writer only as immutable
     how = "mode=ro" if path.with_name(f"{path.name}-wal").exists() else "mode=ro&immutable=1"
     if not path.exists():

@@ -89,7 +89,7 @@ class MeasurementRow(NamedTuple):
     """A measurement at the machine, with the correction in force at that time.
 
     `value` is the expected position minus the one reported by the controller: the apparent deviation of the tool point.
-    With a correction in force it depends on whether the report includes the correction, see `measured_by`.
+    With a correction in force, `value` depends on whether the report includes the correction, see `measured_by`.
     """
 
     time: float

@@ -51,7 +51,7 @@ class Guarded(H11Protocol):
         self.transport.abort()
 
     def look(self, now: float) -> None:
-        """Close the connection if it has been idle or not read for too long; to be called about once a second.
+        """Close the connection if it has been idle, or its data unread, for too long; to be called about once a second.
 
         Parameters
         ----------

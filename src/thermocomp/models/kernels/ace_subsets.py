@@ -112,7 +112,7 @@ def _lane_smooth(work: Work, how: Smoothing, j: int, out: FloatArray) -> Any:
 def _lane_theta(
     total: FloatArray, last_total: FloatArray, how: Smoothing, theta: FloatArray, work: Work, result: FloatArray
 ) -> None:
-    """Compute theta, normalised, from the (extrapolated) sum of phi; row `_MOVE` of `result` is 0 where theta is."""
+    """Compute theta, normalised, from the (extrapolated) sum of phi; row `_MOVE` of `result` is 0 where theta is 0."""
     residual, sums, _, _ = work
     n = len(theta)
     spare = (len(sums) - 1 - n) // 2
@@ -242,7 +242,7 @@ def _first_phi(how: Smoothing, start: FloatArray) -> FloatArray:
 
 @compiled
 def _note_used(on: FloatArray, idle: BoolArray, used: BoolArray) -> None:
-    """Set in `used` the variables that any active lane needs."""
+    """Mark in `used` the variables that any active lane needs."""
     for j in range(len(used)):
         used[j] = False
         for v in range(LANES):

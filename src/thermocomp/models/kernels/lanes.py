@@ -1,4 +1,4 @@
-"""Vectors of eight numbers for numba, which does not vectorise our loops over eight on its own.
+"""Vectors of eight numbers for numba, which does not vectorise loops over eight numbers by itself.
 
 `load` and `store` move a row of an array of shape (n, 8), C order; the other functions work elementwise on loaded
 vectors in double precision, so that each lane has the same result as a scalar. For use in compiled functions only.

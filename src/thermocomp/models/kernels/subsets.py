@@ -56,7 +56,7 @@ def offer(lists: Lists, size: int, value: float, inside: ByteArray, a: int, b: i
 
 @compiled
 def householder(columns: FloatArray, n: int) -> None:
-    """Triangularise the first `n` columns and transform the other columns alike; columns are stored as rows."""
+    """Triangularise the first `n` columns and apply the same reflections to the others; columns are stored as rows."""
     width, rows = columns.shape
     for k in range(min(n, rows)):
         x = columns[k]

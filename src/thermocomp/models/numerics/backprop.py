@@ -18,7 +18,8 @@ INITIAL = 0.3
 def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
     """Return the scaling of channels from their ranges to 0.1 .. 0.9 (C-28).
 
-    A channel whose range is only rounding is constant: it is always scaled to 0.5, so the net cannot react to it.
+    A channel that varies only by rounding counts as constant: it is always scaled to 0.5, so the net cannot react to
+    it.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def learning_rates(n_epochs: int, start: float, end: float, schedule: str) -> Fl
         return np.asarray(start * (end / start) ** part)
     if schedule == "harmonic":
         return np.asarray(start / (1.0 + (start / end - 1.0) * part))
-    raise InputError(f"learning rate schedule {schedule!r}: known are geometric and harmonic")
+    raise InputError(f"learning rate schedule {schedule!r}: expected 'geometric' or 'harmonic'")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Folds of thermal cycles, by which a method chooses its settings."""
+"""Cross-validation folds of thermal cycles, by which a method chooses its settings."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,10 +24,10 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
         return np.arange(n_rows) * min(5, n_rows) // n_rows, "five stretches of equal length, left out in turn"
     given = np.asarray(cycle)
     if given.shape != (n_rows,):
-        raise InputError(f"cycle: expected {n_rows} numbers, found {given.shape}")
+        raise InputError(f"cycle: expected {n_rows} numbers, found an array of shape {given.shape}")
     learned = np.flatnonzero(given >= 0)
     if learned.size == 0:
-        raise FitError("no row to learn from: every row has cycle -1")
+        raise FitError("no training rows: every row has cycle -1; number the cycles of the rows to be used from 0")
     folds = np.full(n_rows, -1, dtype=np.intp)
     number = -1
     for label in dict.fromkeys(given[learned].tolist()):

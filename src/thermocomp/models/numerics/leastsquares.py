@@ -1,4 +1,4 @@
-"""Least squares by QR, centred and scaled; and the number of independent rows equivalent to a residual."""
+"""Least squares by QR, centred and scaled; and the effective sample size of a time series."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -192,7 +192,7 @@ def solve(X: FloatArray, y: FloatArray, tri: Triangle, *, columns: Sequence[int]
 
 
 def effective_sample_size(residual: FloatArray) -> float:
-    """Return the number of independent rows equivalent to the rows of a time series (E-C12).
+    """Return the effective sample size of a time series: the equivalent number of independent rows (E-C12).
 
     n / (1 + 2 sum of the autocorrelations), summed over the lags before the first autocorrelation that is not positive;
     at least 1 and at most n. Boundaries between consecutive tests are ignored.

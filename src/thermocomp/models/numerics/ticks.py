@@ -1,4 +1,4 @@
-"""Recordings on the clock of an autoregressive model, by the same rule as `thermocomp.core.autoregressive`."""
+"""Recordings resampled to ticks of an autoregressive model, by the same rule as `thermocomp.core.autoregressive`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ MOST_TICKS = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class TickedRun:
-    """One test on the clock, uninterrupted and from a cold start.
+    """One test resampled to ticks, uninterrupted and from a cold start.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def check_steps(dt: ArrayLike, n_rows: int) -> FloatArray:
     """Check time steps [s]."""
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
-        raise InputError(f"dt: expected {n_rows} time steps that are not negative")
+        raise InputError(f"dt: expected {n_rows} non-negative time steps [s], the time since the previous row")
     return found
 
 
@@ -62,7 +62,7 @@ def median_step(dt: FloatArray) -> float:
 
 
 def put_on_clock(inputs: FloatArray, dt: FloatArray, interval: float) -> list[TickedRun]:
-    """Resample a recording to the clock.
+    """Resample a recording to ticks.
 
     Parameters
     ----------
@@ -87,7 +87,8 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     time = np.cumsum(step)
     if not time[-1] / h < MOST_TICKS:
         raise InputError(
-            f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s; use a longer interval"
+            f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s, more than {MOST_TICKS:g}; "
+            "use a longer interval"
         )
     share = time / h
     count = np.floor(share + EARLY).astype(np.intp)

@@ -1,4 +1,4 @@
-"""Sets of sensors that are equivalent to the best (Wessel et al. 2004, Appendix B; W-11, W-12).
+"""Sets of sensors that are equivalent to the best set (Wessel et al. 2004, Appendix B; W-11, W-12).
 
 Input: the maximal correlation psi of every set of sensors on every data set. Result: the sets that are best for every
 displacement, or not significantly different from the best by the Wilcoxon test for paired samples.
@@ -50,7 +50,7 @@ class Equivalents:
         return tuple(self.subsets[k] for k in np.flatnonzero(self.equivalent.all(axis=0)))
 
     def table(self) -> tuple["SensorSet", ...]:
-        """Return one row per set, sorted by the number of displacements with equivalence, then by the sum of psi."""
+        """Return one row per set, sorted by the number of displacements with equivalence to the best, then by psi."""
         total = self.summed.sum(axis=0)
         order = np.lexsort((-total, -self.equivalent.sum(axis=0)))
         return tuple(
@@ -108,7 +108,10 @@ def equivalents(
     for d, given in enumerate(psi):
         values = np.asarray(given, dtype=np.float64)
         if values.ndim != 2 or len(values) != len(sets) or values.shape[1] == 0:
-            raise InputError(f"psi of displacement {d}: expected {len(sets)} sets by data sets, found {values.shape}")
+            raise InputError(
+                f"psi of displacement {d}: expected a table of {len(sets)} sets by data sets, found the shape "
+                f"{values.shape}"
+            )
         if not np.isfinite(values).all():
             k, test = np.argwhere(~np.isfinite(values))[0]
             raise InputError(
@@ -126,7 +129,7 @@ def equivalents(
         least, wanted = 2.0 ** (1 - n_tests), level / max(others.size, 1) if holm else level
         if least > wanted:
             notes.append(
-                f"displacement {d}: {n_tests} data sets are too few: the smallest p value there can be is {least:.2g}, "
+                f"displacement {d}: {n_tests} data sets are too few: the smallest possible p value is {least:.2g}, "
                 f"above {wanted:.2g}{' (Holm)' if holm else ''}, so that every set counts as equivalent"
             )
     return Equivalents(

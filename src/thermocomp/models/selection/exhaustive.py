@@ -127,7 +127,7 @@ def _first(values: FloatArray) -> int:
 
 
 def _squares(tri: Triangle, levels: Sequence[Sequence[int]], *, skip: bool) -> FloatArray:
-    """Return the residual sums of squares for one column of each level, or with `skip` optionally none (last choice).
+    """Return the residual sums of squares for one column of each level; with `skip`, also for none of a level (last).
 
     Shape (n_choices of level 0 * n_choices of level 1 * ...,), with the last level varying fastest; 0 for values that
     are indistinguishable from rounding.

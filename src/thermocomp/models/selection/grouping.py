@@ -45,7 +45,7 @@ def group(correlation: FloatArray, threshold: float, *, absolute: bool = False) 
     """
     close = _checked(correlation, absolute)
     if not -1 <= threshold <= 1:
-        raise InputError(f"threshold {threshold}: a correlation is from -1 to 1")
+        raise InputError(f"threshold {threshold}: expected a correlation, from -1 to 1")
     groups: list[tuple[int, ...]] = []
     left = np.arange(len(close))
     while left.size > 1:
@@ -114,7 +114,10 @@ def interval_of(groups: Sequence[Sequence[int]], found: Sequence[Interval]) -> I
 def _checked(correlation: FloatArray, absolute: bool) -> FloatArray:
     C = np.asarray(correlation, dtype=np.float64)
     if C.ndim != 2 or C.shape[0] != C.shape[1] or not np.isfinite(C).all() or not np.array_equal(C, C.T):
-        raise InputError(f"a correlation matrix is square, symmetric and finite; found one of shape {C.shape}")
+        raise InputError(
+            f"correlation: expected a square, symmetric, finite matrix; found the shape {C.shape} or values that are "
+            "not"
+        )
     return np.abs(C) if absolute else C
 
 

@@ -105,7 +105,10 @@ def maximal_correlations(
     tables = [_checked(t, half_window) for t in tests]
     shapes = {(T.shape[1], S.shape[1]) for T, S in tables}
     if len(shapes) > 1:
-        raise InputError(f"tests differ in their numbers of temperatures and displacements: {sorted(shapes)}")
+        raise InputError(
+            f"tests have different numbers of temperatures and displacements: {sorted(shapes)}; give tests with the "
+            "same channels"
+        )
     n_temperatures, n_displacements = shapes.pop()
     chosen = subsets_up_to(n_temperatures, 3) if subsets is None else tuple(tuple(s) for s in subsets)
     members = _membership(chosen, n_temperatures)
@@ -139,11 +142,11 @@ def _checked(test: DataSet, half_window: int) -> tuple[FloatArray, FloatArray]:
         )
     if len(T) < 2 * half_window + 1:
         raise FitError(
-            f"{test.name}: {len(T)} rows, but the boxcar holds {2 * half_window + 1}; use a smaller half_window"
+            f"{test.name}: {len(T)} rows, but the boxcar spans {2 * half_window + 1}; use a smaller half_window"
         )
     bad = ~(np.isfinite(T).all(axis=1) & np.isfinite(S).all(axis=1))
     if bad.any():
-        raise FitError(f"{test.name}: row {int(np.argmax(bad))} contains NaN or infinity; leave such rows out")
+        raise FitError(f"{test.name}: row {int(np.argmax(bad))} contains NaN or infinity; remove such rows")
     return T, S
 
 

@@ -37,7 +37,7 @@ class SensorSets:
 
 @dataclass(frozen=True, eq=False)
 class StandIns:
-    """Substitutes for temperatures; a kept one is predicted from the other kept ones, as if its sensor had failed.
+    """Substitutes for temperatures; a kept one is estimated from the other kept ones, as if its sensor had failed.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class StandIns:
     residual : ndarray of shape (n_temperatures,)
         Root mean square residual of each temperature with these weights [degC].
     loss : ndarray of shape (n_temperatures, n_targets)
-        Loss of accuracy of the model with all temperatures if only this one is substituted [unit of the target].
+        Loss of accuracy of the model with all temperatures if only this temperature is replaced [unit of the target].
     """
 
     single: tuple[int, ...]

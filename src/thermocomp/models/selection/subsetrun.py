@@ -146,7 +146,7 @@ class _Watch:
                 result.stopped = result.stopped or "seconds"
             if self.progress is not None and now - self.said >= 1:
                 self.said = now
-                self.progress(f"best subsets: {result.looked:,} sets looked at in {now - self.began:.0f} s")
+                self.progress(f"best subsets: {result.looked:,} sets examined in {now - self.began:.0f} s")
 
 
 @contextmanager

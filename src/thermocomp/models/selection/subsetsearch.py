@@ -80,7 +80,7 @@ class Problem:
 
 
 class Search:
-    """One thread's part of a search: its working data, and the best sets it found; by itself without branches.
+    """One thread's part of a search: its working data, and the best sets it found; initially without branches.
 
     Parameters
     ----------

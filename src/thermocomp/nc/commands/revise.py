@@ -55,9 +55,9 @@ def revise(
 
     The program is interpreted and timed as by the controller, and its spindle speed drives the models; the predicted
     drift is subtracted from its coordinates. A program that cannot be corrected safely is refused with line and reason.
-    The original program is not changed. Next to the new program are written: the differences (.diff), a table of all
-    lines (.csv), a figure (.png), and the thermal state of the machine at the end (.job.json), from which the next job
-    can start.
+    The original program is not changed. These files are written next to the new program: the differences (.diff), a
+    table of all lines (.csv), a figure (.png), and the thermal state of the machine at the end (.job.json), from which
+    the next job can start.
 
     Parameters
     ----------
@@ -142,12 +142,12 @@ def _bounds(bounds: Sequence[Bound]) -> Layout:
         Column("drift from", lambda b: b.low, "um"),
         Column("to", lambda b: b.high, "um"),
         Column("in the cuts", lambda b: b.without, "um"),
-        Column("left in the cuts", lambda b: b.left, "um"),
+        Column("residual in the cuts", lambda b: b.left, "um"),
         Column("at line", lambda b: b.line or "", ">"),
         Column("model", lambda b: _known(b, b.model), "um"),
         Column("bound", lambda b: _known(b, b.most), "um"),
     )
-    caption = "um; bound of a cut = what is left between updates + largest error of the model on unseen cycles"
+    caption = "um; bound of a cut = residual between updates + largest error of the model on unseen cycles"
     return Layout(columns, bounds, caption=caption)
 
 

@@ -93,14 +93,15 @@ class File:
         )
 
     def called(self, number: int, line: int, *, told: bool) -> tuple[Program, int]:
-        """Return the program called by M98 P and the number of repeats, which the P of some controls contains."""
+        """Return the program called by M98 P, and the number of calls, which some controls include in P."""
         times, last = divmod(number, FOUR)
         who = f"M98 P{number}"
         if number < FOUR or told or number in self._programs:
             if times and not told and last in self._programs:
                 raise ProgramError(
                     line,
-                    f"{who}: one call of O{number}, or {times} calls of O{last:04d}: write the number of calls with L",
+                    f"{who}: either one call of O{number} or {times} calls of O{last:04d}: write the number of calls "
+                    "with L",
                 )
             return self.find(number, line, who), 1
         return self.find(last, line, who), times

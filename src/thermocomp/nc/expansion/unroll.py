@@ -49,8 +49,8 @@ Lines = Generator[tuple[str, int], None, int]
 def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
     """Expand a program into plain lines.
 
-    Expanded are M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``,
-    ``GOTO`` and ``WHILE``. Lines without these, and whole programs without these, are unchanged.
+    M98 and M97 with the called programs of the same file, M99, G65 with arguments, variables, ``IF``, ``GOTO`` and
+    ``WHILE`` are expanded. Lines and programs without these remain unchanged.
     """
     return _Unroller(list(lines), setup).lines()
 
@@ -90,7 +90,7 @@ class _Unroller:
                 yield text, i + 1
 
     def _run(self, frame: _Frame) -> Lines:
-        """Run a program from its current line; return the line number to continue with, 0 for none, -1 if all ended."""
+        """Run a program from its current line; return the N number to continue at, 0 for none, -1 if all have ended."""
         began = False
         program, texts = frame.program, self._texts
         while frame.place < program.stop:
@@ -191,9 +191,9 @@ class _Unroller:
         self, frame: _Frame, line: Line, program: Program, place: int, times: int, given: dict[Key, float] | None
     ) -> Generator[tuple[str, int], None, int | None]:
         if frame.depth >= DEEPEST:
-            raise line.fault(f"more than {DEEPEST} nested calls, which controls refuse")
+            raise line.fault(f"more than {DEEPEST} nested calls, which controls refuse; reduce the nesting")
         if times < 1:
-            raise line.fault("a call that is made 0 times; remove it")
+            raise line.fault("a call with 0 repeats; remove it")
         for _ in range(times):
             own = frame.variables if given is None else frame.variables.called(given)
             done = yield from self._run(_Frame(program, own, frame.depth + 1, place, called=True))
@@ -246,7 +246,7 @@ class _Unroller:
     def _go(self, frame: _Frame, line: Line, goal: str) -> None:
         value = frame.variables.value(line.number, goal, "GOTO")
         if value != int(value):
-            raise line.fault(f"GOTO {value:g}, which is no line number")
+            raise line.fault(f"GOTO {value:g}: a line number must be a whole number")
         self._jump(frame, int(value), line.number, f"GOTO {value:g}")
 
     def _jump(self, frame: _Frame, number: int, line: int, who: str) -> None:
@@ -259,7 +259,9 @@ class _Unroller:
                 continue
             found = _LOOP.fullmatch(squeeze(read_line(text, i + 1, "fanuc").flow))
             if found and frame.program.closing(i, int(found.group("loop"))) >= place:
-                raise ProgramError(line, f"{who} leads into a loop (line {i + 1}), which controls refuse")
+                raise ProgramError(
+                    line, f"{who} jumps into a loop (line {i + 1}), which controls refuse; jump to a line outside it"
+                )
         frame.place = place
         if place < line:
             self._go_back(frame)

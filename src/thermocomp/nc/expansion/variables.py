@@ -57,12 +57,12 @@ class Variables:
             key = self._parameters.key(assignment.target)
             if key not in _LOCAL and key not in _COMMON:
                 raise InputError(
-                    f"{assignment.target} is set, and only #1 to #33 and #100 to #199 are the program's own: the "
-                    "others stay in the control, and plain lines would not set them; use one of those, or omit "
-                    "--expand if no loop or subprogram needs it"
+                    f"{assignment.target} is set, but only #1 to #33 and #100 to #199 belong to the program: the "
+                    "others keep their values in the control, and plain lines would not set them; use a variable of "
+                    "the program, or omit --expand if no loop or subprogram needs it"
                 )
             if "".join(assignment.value.split()) == "#0":
-                raise InputError(f"{assignment.target} is set to empty (#0), which is not followed; give it a value")
+                raise InputError(f"{assignment.target} is set to empty (#0), which is not supported; give it a value")
             same = key in self._parameters and self._parameters[key]
             self._parameters.assign([assignment])
             self.changes += same is False or self._parameters[key] != same
@@ -94,7 +94,9 @@ class Variables:
         if key in _LOCAL and self.macro:
             return True
         raise ProgramError(
-            line, f"whether #{key} is empty is uncertain: the program has not set it, and another program may have"
+            line,
+            f"whether #{key} is empty is uncertain: the program has not set it, but another program may have; set it "
+            "in this program",
         )
 
 

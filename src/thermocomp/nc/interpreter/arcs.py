@@ -21,7 +21,7 @@ Flat = tuple[float, float]
 
 
 class ArcError(Exception):
-    """Impossible arc; the text contains the reason."""
+    """Impossible arc; the message gives the reason."""
 
 
 def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:

@@ -48,7 +48,7 @@ class Modal:
     origin_told : bool
         Program or setup specify the origin of the work coordinate system.
     untold_tool : int or None
-        Number of the tool whose length is in force but not given by program or setup; -1: the tool is unknown, too.
+        Number of the tool whose length is in force but not given by program or setup; -1: the tool itself is unknown.
     turned : bool
         G68 is in force.
     retract_stated : bool
@@ -199,8 +199,8 @@ class Setup:
     speed : float
         Spindle speed S in force when the program starts [1/min]; 0: none.
     offsets : dict of int to tuple of float
-        Origins of work coordinate systems, X Y Z [mm]; missing ones are taken as 0. They give the approximate position
-        of the machine, but are never certain: an axis remains known only by what the program itself sets.
+        Origins of work coordinate systems, X Y Z [mm]; missing ones count as 0. They give the approximate position of
+        the machine, but never count as certain: only origins set by the program itself do.
     tools : dict of int to float
         Lengths of the tools [mm]; used in the same way as `offsets`.
     home : tuple of float or None
@@ -240,7 +240,7 @@ class Setup:
 
 
 def triple(values: Iterable[_Value]) -> tuple[_Value, _Value, _Value]:
-    """Return three values, of X, Y and Z, as a tuple of this length."""
+    """Return the values of X, Y and Z as a tuple of three."""
     x, y, z = values
     return x, y, z
 

@@ -83,7 +83,7 @@ _COMMON_G: Final = (
 )
 
 _NURBS = "NURBS are not supported; write them as G1, G2, G3 or G5"
-_STORES = "it changes the reference point of {}, which is not followed; remove it"
+_STORES = "it changes the reference point of {}, which is not supported; remove it"
 
 _LINUXCNC_G: Final = (
     Code("G5", "motion", "cubic spline"),
@@ -119,7 +119,9 @@ _NO_POLAR = "polar coordinates are not supported; write X and Y"
 HAAS_SYSTEMS: Final = {f"G{109 + n}": n for n in range(1, 21)}
 #: codes of the additional work coordinate systems
 ADDITIONAL_SYSTEMS: Final = frozenset({"G54.1", "G154", *HAAS_SYSTEMS})
-_NO_POCKET = "milling cycles and hole patterns of the control are not followed; output single moves from the CAM system"
+_NO_POCKET = (
+    "milling cycles and hole patterns of the control are not supported; output single moves from the CAM system"
+)
 _WRITTEN = "--expand writes it as plain lines"
 _NO_MODAL_CALL = "modal macro calls are not supported; write G65 on every line that calls the macro"
 _NO_FINE_BORING = "it shifts the tool by a parameter of the control; use G85 or single moves"
@@ -135,7 +137,7 @@ _FANUC_G: Final = (
     Code("G13.1", "polar plane", "polar interpolation off"),
     Code("G15", "polar", "polar coordinates off"),
     Code("G16", "polar", "polar coordinates", _NO_POLAR),
-    Code("G22", "stroke", "stored stroke check", "its axis words are limits, which is not followed; remove it"),
+    Code("G22", "stroke", "stored stroke check", "its axis words are limits, which are not supported; remove it"),
     Code("G23", "stroke", "stored stroke check off"),
     Code("G31", "motion", "skip"),
     Code("G43.4", "tool length", "tool centre point control", _NO_TCP),
@@ -147,7 +149,7 @@ _FANUC_G: Final = (
     Code("G51.1", "mirror", "mirror image", _NO_MIRROR),
     Code("G54.1", "system", "one of the additional work coordinate systems"),
     Code("G61.1", "path", "high accuracy"),
-    Code("G65", "once", "macro call", f"macros are not followed; {_WRITTEN}"),
+    Code("G65", "once", "macro call", f"macros are not supported; {_WRITTEN}"),
     Code("G66", "call", "modal macro call", _NO_MODAL_CALL),
     Code("G67", "call", "modal macro call off"),
     Code("G68", "rotation", "rotation"),
@@ -166,8 +168,8 @@ _FANUC_G: Final = (
     *(Code(f"G{n}", "motion", "pocket or bolt hole cycle of a Haas", _NO_POCKET) for n in (12, 13, 70, 71, 72, 150)),
 )
 
-_CALL = "subprograms are not followed; write their moves in the program"
-_NO_STORING = f"stored modal states are not followed; {_EXPAND}"
+_CALL = "subprograms are not supported; write their moves in the program"
+_NO_STORING = f"stored modal states are not supported; {_EXPAND}"
 
 _COMMON_M: Final = (
     Code("M0", "stop", "stop"),
@@ -197,8 +199,8 @@ _LINUXCNC_M: Final = (
 )
 
 _FANUC_M: Final = (
-    Code("M97", "stop", "local subprogram call", f"subprograms are not followed; {_WRITTEN}"),
-    Code("M98", "stop", "subprogram call", f"subprograms are not followed; {_WRITTEN}"),
+    Code("M97", "stop", "local subprogram call", f"subprograms are not supported; {_WRITTEN}"),
+    Code("M98", "stop", "subprogram call", f"subprograms are not supported; {_WRITTEN}"),
     Code("M29", "tapping", "rigid tapping"),
     Code("M198", "stop", "subprogram call", f"{_CALL} in the CAM system"),
 )

@@ -15,7 +15,7 @@ MOST: Final = 100_000
 
 
 class CycleError(Exception):
-    """Impossible cycle; the text contains the reason."""
+    """Impossible cycle; the message gives the reason."""
 
 
 class CycleMove(NamedTuple):

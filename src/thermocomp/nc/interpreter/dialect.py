@@ -1,7 +1,7 @@
 """Detection of the dialect of a whole program (LinuxCNC or Fanuc); ambiguous programs are refused.
 
 A *sign* is something that one of the two controls refuses: it is conclusive. A *hint* is a habit of LinuxCNC users:
-text after ``;`` (programs for Fanuc controls end lines with a bare one), a comment that LinuxCNC executes or that
+text after ``;`` (programs for Fanuc controls end lines with a bare ``;``), a comment that LinuxCNC executes or that
 names LinuxCNC, arcs in several lines that close only if lengths without a decimal point are whole units. It decides
 the meaning of such lengths and of a few other words (`_USUAL`). Signs and hints count before the end of the program:
 LinuxCNC reads nothing after M2, M30 or a closing ``%``, but a Fanuc may. All words that both accept but interpret
@@ -91,7 +91,7 @@ class Judgement:
     count : dict of str to int
         Number of lines with an ambiguous word of each kind.
     fault : Place or None
-        First ambiguous word on a line that neither control can read, and the reason: it is due to a typing error.
+        First ambiguous word on a line that neither control can read, with the reason: it counts as a typing error.
     """
 
     linuxcnc: Place | None = None
@@ -133,7 +133,7 @@ def check_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
     raise ProgramError(
         first,
         f"{'; '.join(told).removeprefix(f'line {first}: ')}. No word is specific to LinuxCNC or to a Fanuc: "
-        f"write it so that both read it alike, {_EITHER}",
+        f"write the line so that both controls read it alike, {_EITHER}",
     )
 
 
@@ -234,7 +234,7 @@ class _Scan:
             self._sign("fanuc", _BEGINS)
             return
         if len(head["delete"] or "") > 1 or head["again"]:
-            self._sign("fanuc", "a block delete with a number, or behind N, which only a Fanuc or Haas has")
+            self._sign("fanuc", "a block delete with a number, or after N, which only a Fanuc or Haas has")
         if _FANUC_FLOW.match(body) or _FANUC_OUTPUT.match(body):
             self._sign("fanuc", "a macro word of a Fanuc or Haas")
             return

@@ -43,7 +43,7 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
         if told is None or told in CYCLES:
             raise words.error(
                 f"{groups['distance']} while {modal.motion} is in force: whether R and Z of the cycle change their "
-                "meaning depends on the control; write G80 before"
+                "meaning depends on the control; write G80 before it"
             )
     if groups.get("once") == "G92.1" and not words.values.keys() >= {"X", "Y", "Z"}:
         raise words.error(
@@ -55,10 +55,10 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
         if wrong:
             raise words.error(
                 f"{groups.get(wrong[0], wrong[0])} while G68 is in force, which controls reject or read in "
-                "different ways; write G69 before"
+                "different ways; write G69 before it"
             )
     if rotation is not None and modal.cutter:
-        raise words.error(f"{rotation} during cutter compensation; write G40 before")
+        raise words.error(f"{rotation} during cutter compensation; write G40 before it")
     if rotation is not None and code in CYCLES:
         raise words.error(f"{rotation} on a line that drills; put it on a separate line")
 
@@ -75,10 +75,10 @@ def rotate(state: InterpreterState, words: BlockWords) -> None:
         raise words.error(f"G68 in G{modal.plane} is not supported; write the rotated coordinates")
     if not modal.absolute:
         raise words.error(
-            "G68 in G91: whether its words count from the tool position depends on the control; write G90 before"
+            "G68 in G91: whether its words count from the tool position depends on the control; write G90 before it"
         )
     if modal.motion in CYCLES:
-        raise words.error(f"G68 while {modal.motion} is in force; write G80 before")
+        raise words.error(f"G68 while {modal.motion} is in force; write G80 before it")
     values = words.values
     missing = [letter for letter in "XYR" if letter not in values]
     if missing:
@@ -89,7 +89,9 @@ def rotate(state: InterpreterState, words: BlockWords) -> None:
     if "Z" in values:
         raise words.error("G68 with Z is not supported; write X, Y and R only")
     if modal.turned:
-        raise words.error("G68 while G68 is in force: whether the angles add depends on the control; write G69 before")
+        raise words.error(
+            "G68 while G68 is in force: whether the angles add depends on the control; write G69 between them"
+        )
     offsets.turn((values["X"] * state.scale, values["Y"] * state.scale), values["R"])
     _turned(state, "G68")
 
@@ -110,8 +112,8 @@ def check_place(state: InterpreterState, words: BlockWords, code: str) -> None:
         return
     if named != _PLANE_LETTERS or not state.modal.absolute or not (straight or code in CYCLES):
         raise words.error(
-            f"the first move after {state.turned_anew} must be a linear move to X and Y in G90: the position that the "
-            "control assumes for the tool is uncertain before"
+            f"the first move after {state.turned_anew} must be a linear move to X and Y in G90: until then, the tool "
+            "position assumed by the control is uncertain"
         )
     state.turned_anew = ""
 
@@ -149,8 +151,8 @@ def drills(state: InterpreterState, words: BlockWords) -> bool:
     for i, place in state.axis_values(words).items():
         if i != across and not (state.modal.absolute and state.known[i] and abs(place - state.place[i]) < _SAME):
             raise words.error(
-                f"{'XYZ'[i]} with {'K0' if 'K' in words.values else 'L0'}, which stores the words of the cycle: "
-                f"some controls move there; write {'XYZ'[i]} on a line before"
+                f"{'XYZ'[i]} with {'K0' if 'K' in words.values else 'L0'}, which only stores the words of the cycle: "
+                f"some controls move {'XYZ'[i]} nevertheless; write {'XYZ'[i]} on an earlier line"
             )
     return False
 
@@ -163,5 +165,5 @@ def _check_level(state: InterpreterState, words: BlockWords) -> None:
     if sure and above > _SAME:
         raise words.error(
             f"R is {above:g} mm above the initial level of the cycle: when the tool retracts depends on the control; "
-            "move to that level before"
+            "first move to the level of R"
         )

@@ -59,7 +59,7 @@ class Follower:
             raise line.fault(line.error)
         if line.flow:
             remedy = "writes them as plain lines" if self.state.fanuc else "lets the interpreter unroll them"
-            raise line.fault(f"{line.flow}: loops, branches and subprograms are not followed; --expand {remedy}")
+            raise line.fault(f"{line.flow}: loops, branches and subprograms are not supported; --expand {remedy}")
         if not line.words and not line.assignments:
             return self._idle(line)
         words = self._reader.read(line)
@@ -116,8 +116,8 @@ class Follower:
         told, force = words.groups.get("motion"), self.state.modal.motion
         if told is None and force != otherwise and self._motion(words):
             raise words.error(
-                f"takes its motion code {force} from an optional line (/), or {otherwise or 'none'} if "
-                "that is skipped; write the motion code in this line, or set --block-delete"
+                f"its motion code is {force}, from an optional line (/), or {otherwise or 'none'} if that line is "
+                "skipped; write the motion code on this line, or set --block-delete"
             )
         if told is not None or force == otherwise:
             self._if_skipped = None
@@ -174,7 +174,7 @@ class Follower:
         return block
 
     def _after(self, groups: dict[str, str], block: Block, code: str, before: str) -> None:
-        """Put in force the motion code that holds after the line; `before` was in force before it."""
+        """Put in force the motion code that applies after the line; `before` was in force before it."""
         state = self.state
         block.modal = state.modal
         if groups.get("motion") == "G80":

@@ -93,7 +93,9 @@ def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
 
 def lathe(words: BlockWords, sign: str) -> ProgramError:
     """Return the error for a lathe program, with the sign by which it was recognised."""
-    return words.error(f"{sign}: a lathe program: X is a diameter, G99 is feed per turn there; not supported")
+    return words.error(
+        f"{sign}: this is a lathe program, in which X is a diameter and G99 feed per turn; not supported"
+    )
 
 
 def apply_modal_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
@@ -144,14 +146,14 @@ def _unit_of_feed(state: InterpreterState, words: BlockWords) -> None:
 def _check_cutter(state: InterpreterState, words: BlockWords) -> None:
     groups = words.groups
     for group in _NOT_UNDER_CUTTER & groups.keys():
-        raise words.error(f"{groups[group]} is not allowed during cutter compensation; write G40 before")
+        raise words.error(f"{groups[group]} is not allowed during cutter compensation; write G40 before it")
     if groups.get("once") in ("G52", "G92", "G92.1", "G92.2", "G92.3", "G10"):
-        raise words.error(f"{groups['once']} is not allowed during cutter compensation; write G40 before")
+        raise words.error(f"{groups['once']} is not allowed during cutter compensation; write G40 before it")
     if groups.get("cutter", "G40") != "G40":
-        raise words.error(f"{groups['cutter']} while cutter compensation is on; write G40 before")
+        raise words.error(f"{groups['cutter']} while cutter compensation is on; write G40 before it")
     plane = groups.get("plane")
     if plane is not None and int(plane[1:]) != state.modal.plane:
-        raise words.error(f"{plane} during cutter compensation; write G40 before")
+        raise words.error(f"{plane} during cutter compensation; write G40 before it")
 
 
 def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:

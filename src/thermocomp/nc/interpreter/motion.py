@@ -37,7 +37,7 @@ def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
 def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None:
     """Run G53: the words are machine coordinates."""
     if not state.modal.absolute:
-        raise words.error("G53 is not allowed in G91; write G90 before")
+        raise words.error("G53 is not allowed in G91; write G90 before it")
     _refuse_compensated(state, words, "G53")
     if state.modal.motion not in ("G0", "G1"):
         raise words.error("G53 needs G0 or G1 on its line or in force")
@@ -55,13 +55,13 @@ def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None
 
 
 def _refuse_compensated(state: InterpreterState, words: BlockWords, code: str) -> None:
-    """Refuse a code as LinuxCNC does during cutter compensation, which is not computed here."""
+    """Refuse a code that LinuxCNC also refuses during cutter compensation; the compensated path is not computed."""
     if state.modal.cutter:
-        raise words.error(f"{code} is not allowed during cutter compensation; write G40 before")
+        raise words.error(f"{code} is not allowed during cutter compensation; write G40 before it")
 
 
 def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
-    """Return which axes are still known after a move to machine coordinates of some axes."""
+    """Return, per axis, whether it is still known after a move of some axes to machine coordinates."""
     known = mark_axes(state.known, axes, to=False)
     turned = state.offsets.rotation and (0 in axes or 1 in axes)
     return (False, False, known[2]) if turned else known
@@ -143,7 +143,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
     if "K" not in words.values:
         raise words.error(f"{code} needs K, the distance per turn")
     if "F" in words.values:
-        raise words.error(f"{code} takes its feed from K, found F; remove F")
+        raise words.error(f"{code} gets its feed from K, but F was found; remove F")
     _refuse_compensated(state, words, code)
     rotary = state.turn(words)
     start, before, was_known = state.machine, state.place, state.known
@@ -164,12 +164,12 @@ def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
     code = state.modal.motion
     _refuse_compensated(state, words, code)
     if state.modal.feed_mode == 95:
-        raise words.error(f"{code} needs a feed per minute; write G94 and F before")
+        raise words.error(f"{code} needs a feed per minute; write G94 and F before it")
     rotary = state.turn(words)
     start, before = state.machine, state.place
     place, known = state.goal(words)
     if place == before and not rotary:
-        raise words.error(f"{code} starts where it ends; check its axis words")
+        raise words.error(f"{code} ends where it starts; check its axis words")
     state.reach(place, known)
     block.kind = "probe"
     block.moves.append(state.cut(words, start, state.machine, None, rotary))
@@ -185,7 +185,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
         raise words.error(f"{code} is for X and Y in G17 only")
     _refuse_compensated(state, words, code)
     if state.modal.feed_mode == 93:
-        raise words.error(f"{code} in G93 is not supported; write G94 and F before")
+        raise words.error(f"{code} in G93 is not supported; write G94 and F before it")
     needed = ("P", "Q") if code == "G5" else ("I", "J")
     if not all(letter in values for letter in needed):
         raise words.error(f"{code} needs {needed[0]} and {needed[1]}")
@@ -266,16 +266,16 @@ def _keep_words(state: InterpreterState, words: BlockWords, again: bool, axes: d
 
 
 def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Start the spindle: on a Fanuc the tapping cycles do so themselves."""
+    """Start the spindle, as the tapping cycles of a Fanuc do."""
     code = state.modal.motion
     if state.fanuc and code in ("G74", "G84") and not state.turning:
         if state.spindle is None:
-            raise words.error(f"{code} without a spindle speed; write S before")
+            raise words.error(f"{code} without a spindle speed; write S before it")
         block.speed = state.spindle if code == "G84" else -state.spindle
 
 
 def _ends_certainly(state: InterpreterState) -> bool:
-    """Return whether the level at the end of a cycle is known: R by G99, or the initial level, or both are equal."""
+    """Return whether the level after a cycle is known: R (G99), the initial level (G98), or R in either mode."""
     modal = state.modal
     if modal.retract_stated and modal.retract == 99 and modal.absolute:
         return True
@@ -294,17 +294,17 @@ def _refuse_near_r(start: float, level: float, plane: float, words: BlockWords) 
 def _may_drill(state: InterpreterState, words: BlockWords) -> None:
     code, modal = state.modal.motion, state.modal
     if {"A", "B", "C"} & words.values.keys():
-        raise words.error(f"{code} with a rotary axis; turn it on a separate line before")
+        raise words.error(f"{code} with a rotary axis; turn the axis on an earlier line")
     if modal.feed_mode == 93:
-        raise words.error(f"{code} is not allowed in G93; write G94 and F before")
+        raise words.error(f"{code} is not allowed in G93; write G94 and F before it")
     _refuse_compensated(state, words, code)
     if state.fanuc:
         return
     turning = state.turning
     if code in ("G74", "G84", "G87") and modal.plane != 17:
-        raise words.error(f"{code} in G{modal.plane}: LinuxCNC 2.9 confuses the axes there; write G17 before")
+        raise words.error(f"{code} in G{modal.plane}: LinuxCNC 2.9 confuses the axes there; write G17 before it")
     if code in ("G74", "G84", "G86", "G87") and not turning:
-        raise words.error(f"{code} while the spindle is stopped; start it before")
+        raise words.error(f"{code} while the spindle is stopped; start it first")
     if (code == "G84" and turning < 0) or (code == "G74" and turning > 0):
         raise words.error(
             f"{code} while the spindle turns in the wrong direction; write {'M3' if code == 'G84' else 'M4'} before it"

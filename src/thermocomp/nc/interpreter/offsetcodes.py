@@ -30,8 +30,8 @@ def tool_length(state: InterpreterState, words: BlockWords) -> None:
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:
         raise words.error(
-            f"{code} after G20 or G21 under a tool length: LinuxCNC 2.9 converts its unit wrongly and moves Z by it; "
-            "write G49 before the unit changes"
+            f"{code} after a change of unit (G20, G21) with a tool length in force: LinuxCNC 2.9 converts the length "
+            "wrongly and moves Z by the error; write G49 before the unit changes"
         )
     state.length_inch = None if code == "G49" else state.modal.inch
     if code == "G43.1":

@@ -32,12 +32,12 @@ _ANGLE = re.compile(r"(?<![A-Z])(?:ASIN|ATAN)(?![A-Z])")
 _VARIABLE = re.compile(r"#(?:0*[1-9][0-9]{3,}|#[#0-9]*|\[)")
 
 _SHIFT = (
-    "shares one store with G92 and G52 in LinuxCNC, which keeps it after the end of the program; a Fanuc stores it "
-    "separately and clears it: shift by G54 to G59"
+    "shares one stored offset with G92 and G52 in LinuxCNC, which keeps it after the end of the program; a Fanuc "
+    "stores it separately and clears it: shift by G54 to G59"
 )
 _OTHER = "is a different cycle in LinuxCNC and in a Fanuc: replace it with its moves"
 _TILTED = "sets the tool length offset to its words in LinuxCNC, and applies the length along a tilted tool in a Fanuc"
-_NORMAL = "takes the cutter diameter from D in LinuxCNC, and turns an axis along the path in a Fanuc (normal direction)"
+_NORMAL = "reads the cutter diameter from D in LinuxCNC, and turns an axis along the path in a Fanuc (normal direction)"
 _STORES = "stores the tool position in LinuxCNC, and moves in a Fanuc (to a floating reference point)"
 #: codes that are ambiguous wherever they occur: kind, and interpretations
 _OPEN_CODES: Final = {
@@ -49,7 +49,7 @@ _OPEN_CODES: Final = {
         "axis does not move (G7 X0 to G7 X1)",
     ),
     **dict.fromkeys((28.1, 30.1), ("stored home", _STORES)),
-    33.0: ("thread", "takes the distance per turn from K in LinuxCNC, and from F in a Fanuc"),
+    33.0: ("thread", "reads the distance per turn from K in LinuxCNC, and from F in a Fanuc"),
     **dict.fromkeys((41.1, 42.1), ("normal", _NORMAL)),
     43.1: ("tilted", _TILTED),
     43.2: ("tilted", "adds a tool length to that in force in LinuxCNC, and applies it along a tilted tool in a Fanuc"),
@@ -112,7 +112,9 @@ def list_open_words(line: LineWords, force: InForce) -> Iterator[OpenWord]:
     yield from _open_lathe(codes, values, force)
     if force.feed and _is_bare(values.get("F", "")):
         unit = f"{force.unit or ' mm'} per {'turn' if force.per_turn else 'minute'}"
-        what = f"is {int(values['F'])}{unit} in LinuxCNC, maybe in least increments in a Fanuc: write the decimal point"
+        what = (
+            f"is {int(values['F'])}{unit} in LinuxCNC, perhaps in least increments in a Fanuc: write the decimal point"
+        )
         yield OpenWord("feed", f"F{values['F']}", f"{what} (F{values['F']}.)")
     if force.motion in DRILLS and not values.keys().isdisjoint("XYZABC") and codes.isdisjoint(TAKES_AXES):
         yield from _open_cycle(codes, line, force)
@@ -166,17 +168,17 @@ def _open_machine(line: LineWords) -> Iterator[OpenWord]:
 
 def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
     if line.computed:
-        what = "is a code that is computed at run time, and it may be one with two readings: write its number"
+        what = "is computed at run time, and may be a code that the controls interpret differently: write its number"
         yield OpenWord("computed", line.computed, what)
     if _LOGIC.search(line.code):
-        what = "works on bits in a Fanuc, and on true and false in LinuxCNC: do without it"
+        what = "works on bits in a Fanuc, and on true and false in LinuxCNC: avoid it"
         yield OpenWord("logic", "AND, OR or XOR", what)
     if _ROUNDING.search(line.code):
-        what = "rounds differently in a Fanuc and in LinuxCNC (below zero, or ROUND within a word): do without it"
+        what = "rounds differently in a Fanuc and in LinuxCNC (below zero, or ROUND within a word): avoid it"
         yield OpenWord("rounding", "FIX, FUP, MOD or ROUND", what)
     if _ANGLE.search(line.code):
         what = (
-            "below zero is a negative angle in LinuxCNC, and 360 degrees more in a Fanuc set so (parameter 6004): "
+            "below zero is a negative angle in LinuxCNC, and may be 360 degrees more in a Fanuc (parameter 6004): "
             "write the angle as a number"
         )
         yield OpenWord("angle", "ASIN or ATAN", what)
@@ -186,7 +188,7 @@ def _open_expressions(line: LineWords) -> Iterator[OpenWord]:
 
 
 def _open_lathe(codes: set[float], values: dict[str, str], force: InForce) -> Iterator[OpenWord]:
-    """Yield words that a Fanuc lathe interprets differently; the whole program decides if it is a lathe (`DOUBTS`)."""
+    """Yield words that a Fanuc lathe interprets differently, unless the whole program rules out a lathe (`DOUBTS`)."""
     if 99.0 in codes or (98.0 in codes and force.per_turn):
         code = "G99" if 99.0 in codes else "G98"
         what = "without cycles is feed per turn (G99) or minute (G98) on a Fanuc's lathe: write G95 or G94 instead"
@@ -284,7 +286,7 @@ def _open_lengths(codes: set[float], values: dict[str, str], force: InForce) -> 
 
 
 def _counts(value: str | None) -> bool:
-    """Return whether a dwell may be in seconds or milliseconds: all controls read fractions as seconds."""
+    """Return whether a dwell may be either in seconds or in milliseconds: all controls read fractions as seconds."""
     return value is not None and (number := read_number(value)) != 0.0 and number % 1.0 == 0.0
 
 

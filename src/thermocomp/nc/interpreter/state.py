@@ -146,7 +146,7 @@ class InterpreterState:
         self.machine = self.offsets.machine(place)
 
     def renamed(self, still: Known) -> None:
-        """Keep the tool position under new offsets; known coordinates remain so where `still` is True."""
+        """Keep the tool position under new offsets; known coordinates remain known where `still` is True."""
         self.place = self.offsets.program(self.machine)
         self.known = combine_known(self.known, still)
 
@@ -189,7 +189,7 @@ class InterpreterState:
         """
         feed = pitch * abs(self.speed)
         if not feed:
-            raise words.error("a feed per turn while the spindle is stopped; start it with S and M3 before")
+            raise words.error("a feed per turn while the spindle is stopped; start it first, with S and M3")
         move = Move(rapid=False, start=start, end=end, arc=arc, feed=feed, rotary=rotary)
         move.seconds = (length(move) or rotary) / feed * 60.0
         return move

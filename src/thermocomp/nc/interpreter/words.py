@@ -117,16 +117,16 @@ class Reader:
             if letter in "RPQ" and "M19" in words.codes:
                 word = f"{letter}{words.words[letter].value.strip()}"
                 return (
-                    f"M19 with {word} turns the spindle to an angle in a way that the machine builder has defined, "
-                    "which is not followed; M19 alone is. Neither moves an axis: revise the program without "
-                    f"{word}, and put it back after M19 in the revised program"
+                    f"M19 with {word} orients the spindle in a way that the machine builder has defined, which is not "
+                    "supported; M19 alone is. Neither moves an axis: revise the program without "
+                    f"{word}, and put {word} back after M19 in the revised program"
                 )
             other = USED_BY["linuxcnc"].get(letter, frozenset())
             theirs = owner if owner in other else next((c for c in words.codes if c in other and c[0] == "G"), "")
             if theirs:
                 return (
                     f"LinuxCNC's {theirs} has {letter}, a Fanuc's has none: remove {letter}, or give "
-                    "--controller linuxcnc if the program is for that"
+                    "--controller linuxcnc if the program is for LinuxCNC"
                 )
             return f"the line has {letter} but no code that uses it; remove it, or add the code"
         return (

@@ -1,8 +1,9 @@
-"""Receiver of the canonical calls of LinuxCNC's interpreter, which it writes in blocks.
+"""Receiver of the canonical calls of LinuxCNC's interpreter; it writes them in blocks.
 
-The module only reports moves, offsets and comments. Its functions for spindle, coolant, stops and the like are empty:
-the interpreter's entries for them are redirected to methods of the receiver, and a missing one is an error. The
-module gives lengths in inches, whatever the unit of the program; lengths other than those of moves are output in mm.
+LinuxCNC's module `gcode` only reports moves, offsets and comments. Its functions for spindle, coolant, stops and the
+like are empty: the interpreter's entries for them are redirected to methods of the receiver, and a missing entry is an
+error. The module gives lengths in inches, whatever the unit of the program; lengths other than those of moves are
+output in mm.
 
 Part of the script `_rs274_child.py`: standard library only.
 """

@@ -5,8 +5,8 @@ it only uses `_rs274_canon.py`, which receives the calls, and `_rs274_hooks.py`,
 `_rs274_reading.py` in the same folder. `rs274process.py` starts it with the folders of jobs, which run one after the
 other, each in a separate process, and reads the output: a line with the names of the kinds (JSON), then blocks, each
 with two numbers (number of records, bytes of JSON), the records, and a JSON list of all non-numeric data: the first
-number of such a record is its index in the list. After each job follows a block without records, with the exit code of
-the job. Moves are in program coordinates [inch, deg]; each arc is preceded by a record with its centre.
+number of such a record is its index in the list. The output of each job ends with a block without records that contains
+the exit code. Moves are in program coordinates [inch, deg]; each arc is preceded by a record with its centre.
 """
 
 import ctypes

@@ -67,7 +67,7 @@ class Hooks:
     def turn(self, library: str, functions: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]]) -> dict[str, Any]:
         """Replace the functions that have these mangled names; return the originals.
 
-        A replacement is a function with its result type and argument types.
+        A replacement is a pair: the function, and the types of its result and arguments.
         """
         found = slots(library, set(functions))
         missing = sorted(set(functions) - set(found))

@@ -69,7 +69,7 @@ class ProgramReading:
         path = os.path.realpath(os.fsdecode(name))
         if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):  # noqa: PTH110, PTH112, PTH113
             raise RefusedError(
-                self.where()[0], f"{path} is a pipe or a device, which may have no end: put a file of that name there"
+                self.where()[0], f"{path} is a pipe or a device, which may have no end; replace it with a regular file"
             )
         folders = [self.home] if write else [self.home, *self.folders]
         if any(os.path.commonpath((path, folder)) == folder for folder in folders) or not os.path.exists(path):  # noqa: PTH110
@@ -98,8 +98,8 @@ class ProgramReading:
         what = f"{count} without a move of an axis" if idle or late else f"more than {MOST:,} lines"
         raise RefusedError(
             self.find_loop(),
-            f"the loop here has run {what}: it seems to have no end; write a condition that becomes false, or let one "
-            "program run fewer passes",
+            f"this loop has run {what}: it seems to have no end; write a condition that becomes false, or reduce the "
+            "number of passes per program",
         )
 
     def look_at_time(self) -> None:
@@ -120,7 +120,7 @@ class ProgramReading:
         if self.calls - self.before > MOST_OF_LINE:
             return f"this line makes more than {MOST_OF_LINE:,} moves: write fewer repeats (L) or larger pecks (Q)"
         if self.calls > self.most_calls:
-            return f"more than {self.most_calls:,} moves have been made up to here: let one program do less"
+            return f"more than {self.most_calls:,} moves have been made up to here: divide the program"
         return None
 
     def check_output(self, told: int) -> str | None:

@@ -2,7 +2,7 @@
 
 The child runs isolated (``-I``) in a separate folder and reads a copy of the program there: no other file next to the
 program is imported or run, only subprograms (``.ngc``) are found. The copy is ASCII: the interpreter's module cannot
-report other comments.
+report comments with other characters.
 """
 
 import json
@@ -172,7 +172,7 @@ class InterpreterJob:
 
 
 class InterpreterRun:
-    """Consecutive runs of the interpreter, which starts with the object and ends with the `with` block.
+    """Consecutive runs of the interpreter, which is started on creation and stopped at the end of the `with` block.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ class InterpreterRun:
             if not count:
                 if refusal:
                     where = f" (in {Path(file).name})" if file else ""
-                    raise ProgramError(max(line, 1), f"the interpreter refuses it{where}: {refusal}")
+                    raise ProgramError(max(line, 1), f"the interpreter refuses the program{where}: {refusal}")
                 if not done:
                     self._ended(line, block.more[0])
                 return

@@ -114,7 +114,7 @@ def evaluate(text: str, parameters: Parameters, *, word: bool = True) -> float:
 
 @lru_cache(maxsize=4096)
 def _read_simple(text: str, controller: Controller) -> tuple[float | int, Binary | None, float | int] | None:
-    """Return operands and operator of a simple expression, with parameter numbers as int; None for any other one."""
+    """Return operands and operator of a simple expression, with parameter numbers as int; None for any other."""
     found = _SIMPLE.fullmatch(_BLANKS.sub("", text).lower())
     if found is None or bool(found[1]) != bool(found[7]) or not (found[1] or controller == "fanuc" or not found[4]):
         return None
@@ -215,7 +215,7 @@ class _Reader:
         elif self.text.startswith("[", self.place):
             key = self._index(self.bracket())
         else:
-            raise self.error("a number, a <name> or '[' behind '#'")
+            raise self.error("a number, a <name> or '[' after '#'")
         for _ in range(marks):
             key = self._index(self.parameters[key])
         return key
@@ -243,13 +243,14 @@ class _Reader:
             result = float(own.get(name, FUNCTIONS[name])(value))
         if fanuc and name in {"asin", "atan"} and result < 0:
             raise InputError(
-                f"in '{self.written}': {name.upper()} is {result:g} or {result + 360:g} degrees, as the control is set"
+                f"in '{self.written}': {name.upper()} is {result:g} or {result + 360:g} degrees, depending on the "
+                "settings of the control; write the angle as a number"
             )
         return result
 
     def _exists(self) -> float:
         if not self.takes("[#"):
-            raise self.error("'[#' behind EXISTS")
+            raise self.error("'[#' after EXISTS")
         key = self.parameter()
         if not self.takes("]"):
             raise self.error("']'")

@@ -1,4 +1,4 @@
-"""Parser of any line of a program, for those that the fast parsers of `thermocomp.nc.parser.tokens` leave.
+"""Parser of any line of a program, for those that the fast parsers of `thermocomp.nc.parser.tokens` do not handle.
 
 A line is first squeezed, that is, stripped of blanks and comments, then parsed, and its columns are mapped back to the
 text.

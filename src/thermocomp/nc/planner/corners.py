@@ -2,7 +2,7 @@
 
 The controller is LinuxCNC 2.9. Moves that meet at a small angle are joined without a stop; otherwise an arc is inserted
 in the corner, as large as the tolerance and half of each move allow; if no arc fits, the next move begins while the
-last one decelerates. Other controllers have similar functions under other names.
+previous one decelerates. Other controllers have similar functions under other names.
 """
 
 import math

@@ -106,8 +106,8 @@ class Timed(NamedTuple):
 def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[Timed]:
     """Yield the start and end time of each block.
 
-    A rounded corner counts to the block after it, as in LinuxCNC, and if lines are merged under ``G64 P``, the last one
-    takes the time. Memory is bounded: the look-ahead is several hundred moves.
+    The time of a rounded corner counts towards the block after it, as in LinuxCNC, and that of lines merged under
+    ``G64 P`` towards the last of them. Memory is bounded: the look-ahead is several hundred moves.
     """
     plan = _Plan(kinematics)
     done = plan.done

@@ -69,7 +69,7 @@ def _drift(ax: Axes, bound: Bound, time: FloatArray, run: Run) -> None:
     ax.plot(*_within(time, drift), color=MEASURED, lw=1.6, label="drift")
     taken = -carried[:, ::-1]
     ax.plot(*_within(time, taken), color=TAKEN_OFF, lw=1.0, label="corrected by the program (minus the correction)")
-    ax.plot(*_cuts(time, left), color=RESIDUAL, lw=1.4, label="left in the cuts")
+    ax.plot(*_cuts(time, left), color=RESIDUAL, lw=1.4, label="residual in the cuts")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -_SMALL), max(high, _SMALL))
     ax.set_ylabel(f"{bound.axis} [um]")
@@ -82,7 +82,7 @@ def _said(bound: Bound, *, cut: bool) -> str:
     if not cut:
         return f"the tool drifts by up to {far:.1f} um; nothing is cut"
     wrong = "the model was never judged: no bound" if math.isnan(bound.model) else f"bound {bound.most:.1f} um"
-    return f"the tool drifts by up to {far:.1f} um; in the cuts at most {bound.left:.1f} um is left; {wrong}"
+    return f"the tool drifts by up to {far:.1f} um; residual in the cuts at most {bound.left:.1f} um; {wrong}"
 
 
 def _within(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -47,18 +47,18 @@ def read(path: str | Path) -> Forecast:
     try:
         check_file(source, FileLimits())
         if source.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{source}: has more than {_MOST_BYTES >> 20} MiB, the limit of a forecast; remove rows")
+            raise InputError(f"{source}: exceeds {_MOST_BYTES >> 20} MiB, the limit of a forecast; remove rows")
         text = source.read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
         raise InputError(f"{source}: no such file") from e
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as a text file of a forecast: {e}") from e
+        raise InputError(f"{source}: cannot be read as a text file: {e}") from e
     lines = [
         (n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
     ]
     if len(lines) < 2:
         raise InputError(
-            f"{source}: a forecast needs a line of headings and rows of numbers below it; found {len(lines)}"
+            f"{source}: a forecast needs a line of headings and rows of numbers below it; found {len(lines)} line(s)"
         )
     delimiter = next((d for d in "\t;" if d in lines[0][1]), ",")
     cells = [_cells(line, delimiter, f"{source}: line {number}") for number, line in lines]
@@ -79,7 +79,10 @@ def read(path: str | Path) -> Forecast:
         }
         now = numbers.pop(time)
         if now is None or not now > last:
-            raise InputError(f"{where}, column {headings[time]!r}: {row[time]!r}: times must be given and increase")
+            raise InputError(
+                f"{where}, column {headings[time]!r}: {row[time]!r}: every row needs a time later than that of the "
+                "row before"
+            )
         last = now
         for k, value in numbers.items():
             if value is not None:

@@ -10,7 +10,7 @@ from thermocomp.nc.rewrite.demand import AWAY, Elsewhere
 from thermocomp.nc.rewrite.header import wrap_text
 from thermocomp.nc.rewrite.revise import Revision
 
-UNPROVED = "UNPROVED: NO INTERPRETER HAS JUDGED IT"
+UNPROVED = "UNPROVED: NO INTERPRETER HAS VERIFIED IT"
 #: maximum number of lines for the models, and for origins and tools
 _MODELS, _PLACE = 2, 3
 #: number of other lines: note of the revision, version and date, program, start, zero, method, bound
@@ -26,14 +26,14 @@ def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_
 
 
 def describe_models(models: Sequence[str]) -> list[str]:
-    """Return the lines about the models, with all excess models on the last line."""
+    """Return the lines about the models; the last line lists all models for which no line is left."""
     said = [f"model {m}" for m in models]
     return said if len(said) <= _MODELS else [*said[: _MODELS - 1], ", ".join(said[_MODELS - 1 :])]
 
 
 def told_taken(taken: Sequence[str]) -> list[str]:
     """Return the line about unproven models, with the persons who approved them."""
-    return [f"unproven, taken by {'; '.join(taken)}"] if taken else []
+    return [f"unproven, approved by {'; '.join(taken)}"] if taken else []
 
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
@@ -49,7 +49,7 @@ def describe_proof(proof: Proof | None, lines: int) -> list[str]:
 
 
 def describe_place(revision: Revision, axes: Sequence[str]) -> list[str]:
-    """Return the lines about the origins and tools of the revision, and the error with other ones."""
+    """Return the lines about the origins and tools of the revision, and the error with others."""
     return [*wrap_text(f"made for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
 
 
@@ -68,4 +68,4 @@ def describe_origins(revision: Revision) -> str:
 def cost(elsewhere: Elsewhere, axes: Sequence[str]) -> str:
     """Return the error that another work offset or tool length would cause."""
     costs = ", ".join(f"{axis} {elsewhere.most['XYZ'.index(axis)]:.1f} um" for axis in axes)
-    return f"{AWAY:g} mm of another offset cost up to {costs}"
+    return f"{AWAY:g} mm offset change: error up to {costs}"

@@ -25,7 +25,7 @@ from thermocomp.nc.rewrite.revise import Revised, Revision
 from thermocomp.nc.thermal.drift import Drift
 
 #: remedy in the error for a program that cannot be proved
-ALL_THE_SAME = "--unproved writes it anyway, and its header says so"
+ALL_THE_SAME = "--unproved writes it anyway, and its header states this"
 #: names of the draft program and diff, whose header is still blank
 PROGRAM, DIFF = "program", "diff"
 #: larger programs are checked completely before their revision, which takes long [bytes]
@@ -314,4 +314,4 @@ def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell)
     except ProgramError:
         raise
     except InputError as e:  # any reason that prevents the interpreter from verifying the program
-        raise InputError(f"it cannot be proved: {e}; {ALL_THE_SAME}") from e
+        raise InputError(f"the revised program cannot be proved: {e}; {ALL_THE_SAME}") from e

@@ -1,6 +1,6 @@
 """Options of a revision, as given to ``thermocomp revise``, and the objects built from them.
 
-Those of the drift are in `thermocomp.nc.revision.thermaloptions`.
+The options of the drift are in `thermocomp.nc.revision.thermaloptions`.
 """
 
 from collections.abc import Sequence
@@ -97,7 +97,7 @@ class Way:
         """Return the folders of subprograms."""
         folders = self.subroutines or []
         if folders and not self.expand:
-            raise InputError("--subroutines is for --expand: without it subprograms are refused")
+            raise InputError("--subroutines requires --expand: without --expand, subprograms are refused")
         for folder in folders:
             if not folder.is_dir():
                 raise InputError(f"--subroutines {folder}: no such directory")
@@ -137,8 +137,8 @@ class Controller:
     home : str
         Position approached by G28, such as "0 mm, 0 mm, 400 mm".
     rotation : list of str
-        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; none if there are
-        none. They rotate the corrections of X and Y.
+        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; "none" states that none
+        is stored. They rotate the corrections of X and Y.
     no_g92 : bool
         Confirm that no G92 or G52 is in force at the start of the program, nor suspended by G92.2: the method offset
         would erase it.
@@ -148,8 +148,8 @@ class Controller:
     least : str
         Least input increment of the controller.
     block_delete : str
-        Block delete. on: lines that begin with / are not run. off: they may be run or not, and a program that depends
-        on it is refused. Required with --expand: off writes them as plain lines.
+        Block delete. on: lines that begin with / are not run. off: they may be run or not, and a program whose result
+        depends on this is refused. Required with --expand: off writes them as plain lines.
     harmless : list of str
         M codes of the machine builder that move no axis and do not change the spindle state, such as M88
         of a Fanuc or M101 of LinuxCNC.
@@ -201,7 +201,7 @@ class Controller:
         if self.diameter is None:
             return None
         if not expand:
-            raise InputError("--diameter is for --expand: without it G41 and G42 stay in the program")
+            raise InputError("--diameter requires --expand: without --expand, G41 and G42 stay in the program")
         return dict(tool_of(text, "--diameter", "10 mm") for text in self.diameter)
 
 
@@ -236,7 +236,7 @@ class Timing:
             return MotionLimits(tool_change=change, stop=stop), [guess]
         axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
         notes = [
-            f"{self.machine}: no {what} of {', '.join(silent)}: taken as {taken}"
+            f"{self.machine}: no {what} of {', '.join(silent)}: assumed to be {taken}"
             for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
             if (silent := [a.name for a in axes if getattr(a, what) is None])
         ]

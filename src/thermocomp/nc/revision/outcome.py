@@ -17,8 +17,8 @@ def warnings(job: Job, done: Done) -> list[str]:
     drift, revision = job.drift, job.revision
     found = list(drift.assumed)
     found += [
-        f"{o.name} went to {o.farthest:g} {o.unit}, and a model was trained from {o.low:g} to {o.high:g} {o.unit}: "
-        f"outside its range for {duration(o.seconds)}, the bound is widened by its whole prediction since"
+        f"{o.name} reached {o.farthest:g} {o.unit}, and a model was trained from {o.low:g} to {o.high:g} {o.unit}: "
+        f"outside its range for {duration(o.seconds)}; since then the bound includes its whole prediction"
         for o in drift.outside
     ]
     found += [
@@ -26,7 +26,7 @@ def warnings(job: Job, done: Done) -> list[str]:
         for name, seconds in drift.held.items()
     ]
     found += [
-        f"{axis} was needed {far:.1f} mm beyond its outermost station: the value there was held"
+        f"{axis} was corrected at up to {far:.1f} mm beyond its outermost station: the value there was held"
         for axis, far in drift.beyond.items()
     ]
     found += [
@@ -57,10 +57,10 @@ def warnings(job: Job, done: Done) -> list[str]:
     ]
     if all(i.quantity == SPEED for s in drift.stations for i in s.model.inputs):
         found.append(
-            "the models know the spindle speed alone: a change of the room temperature is not part of the bounds"
+            "the models use the spindle speed alone: a change of the room temperature is not part of the bounds"
         )
     if done.written and done.proof is None:
-        found.append(f"no interpreter has judged it (--unproved){_assumed(revision.setup)}")
+        found.append(f"no interpreter has verified it (--unproved){_assumed(revision.setup)}")
     if done.written and job.paths.picture is None:
         found.append("no picture was drawn: matplotlib is not installed (pip install 'thermocomp[study]')")
     return found
@@ -72,7 +72,7 @@ def describe_place(job: Job, done: Done) -> list[str]:
         return []
     revision = job.revision
     cost = headers.cost(revision.elsewhere, job.drift.axes)
-    return [f"it is made for {headers.describe_origins(revision)}; {cost}"]
+    return [f"the correction is made for {headers.describe_origins(revision)}; {cost}"]
 
 
 def explain_nothing(job: Job, done: Done) -> str:
@@ -83,7 +83,7 @@ def explain_nothing(job: Job, done: Done) -> str:
     if most <= TELLING * tolerance:
         return f"{said}, and corrections start at {tolerance:g} um; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
-        why = ", ".join(revision.held) or "the time between renewals"
+        why = ", ".join(revision.held) or "the time between updates"
         return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"
     if method.leaves_mark:
         return (

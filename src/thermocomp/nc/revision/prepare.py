@@ -129,10 +129,10 @@ def _check_interpreter(way: Way, setup: Setup, *, diameters: bool) -> None:
         raise InputError(f"--expand: {reason}")
     if way.expand and setup.controller == "fanuc" and (way.subroutines or diameters):
         raise InputError(
-            "--subroutines and --diameter are for LinuxCNC: a Fanuc's subprograms are in its file, and its G41 stays"
+            "--subroutines and --diameter are for LinuxCNC only: a Fanuc file contains its subprograms, and keeps G41"
         )
     if not way.unproved and (reason := rs274.find_obstacle()):
-        raise InputError(f"it cannot be proved: {reason}; {ALL_THE_SAME}")
+        raise InputError(f"the revised program cannot be proved: {reason}; {ALL_THE_SAME}")
 
 
 def _moment(text: str | None) -> datetime:

@@ -44,8 +44,8 @@ class Drifting:
     constant : list of str
         Constant values of model inputs that do not follow from the program, such as "ambient=22 degC".
     forecast : Path
-        CSV file with the course of such inputs over the time since the start of the program (columns such as time_min,
-        ambient_C).
+        CSV file with model inputs that do not follow from the program, over the time since its start (columns such as
+        time_min, ambient_C).
     accept_unproven : str
         Person who approves the use of unproven models, and the reason: "NAME, REASON".
     """
@@ -65,7 +65,9 @@ class Drifting:
         """Return the inputs that do not follow from the program, and notes on them."""
         models = [s.model for s in found]
         if self.constant and all(i.quantity == SPEED for m in models for i in m.inputs):
-            raise InputError(f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone")
+            raise InputError(
+                f"--constant {self.constant[0]!r}: the models are driven by the spindle speed alone; omit it"
+            )
         signals = constants(self.constant or (), models)
         for m in models:
             _refuse_heated(m, signals)
@@ -148,7 +150,7 @@ class Starting:
                 "--measured z=12um"
             )
         if self.pause is not None and self.carried is None:
-            raise InputError("--pause is the time since the last job: it goes with --carried")
+            raise InputError("--pause is the time since the last job: it requires --carried")
 
     def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
         """Return the state of the models at the start of the program."""

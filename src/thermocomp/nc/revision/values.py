@@ -44,7 +44,7 @@ def rotations_of(texts: Sequence[str]) -> dict[int, float]:
         said, example = f"--rotation {text!r}", "G54=12 deg"
         system, turned = _system(name, said, example), _ANGLE.fullmatch(angle.strip())
         if turned is None:
-            raise InputError(f'{said}: write an angle in degrees, such as "{example}", or none alone')
+            raise InputError(f'{said}: write an angle in degrees, such as "{example}", or "none" as the only value')
         found[system] = float(turned[1])
     return found
 
@@ -88,7 +88,7 @@ def m_code_of(text: str, controller: Controller) -> int:
             f"--harmless {text!r}: {code.name} is a known code ({code.does}) and is followed as such; remove the option"
         )
     if controller == "linuxcnc" and not 100 <= int(number) < 200:
-        raise InputError(f"--harmless {text!r}: LinuxCNC has no such code; a user's own are M100 to M199")
+        raise InputError(f"--harmless {text!r}: LinuxCNC has no such code; user-defined codes are M100 to M199")
     return int(number)
 
 

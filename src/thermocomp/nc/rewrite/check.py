@@ -34,8 +34,8 @@ class Check:
     def check(self, block: Block, change: Change) -> None:
         """Compare a block with its revision."""
         longest = max(map(len, change.texts))
-        if longest > max(LONGEST, len(block.line.text)):
-            raise block.error(f"would become a line of {longest} characters; divide it")
+        if longest > (most := max(LONGEST, len(block.line.text))):
+            raise block.error(f"would become a line of {longest} characters; at most {most} are allowed; divide it")
         self._texts.extend(change.texts)
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]
@@ -54,7 +54,7 @@ class Check:
                     continue
                 raise _fault(block, change, f"moves {'XYZ'[axis]} by {found:.2f} um instead of {wanted:.2f} um")
             if (was.arc or now.arc) and not _same_arc(was, now, change.after):
-                raise _fault(block, change, "makes another arc")
+                raise _fault(block, change, "makes a different arc")
 
 
 def _same_arc(was: Move, now: Move, shift: Vector) -> bool:

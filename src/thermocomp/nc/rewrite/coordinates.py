@@ -31,7 +31,7 @@ SLOWER, LATER = 0.015, 0.004
 
 @dataclass
 class _Edit:
-    """Amounts of the correction in the words of X, Y and Z after a line, and what changes on the line for that."""
+    """Amounts of the correction in the words of X, Y and Z after a line, and the changes of the line for this."""
 
     new: list[float]
     shifts: dict[str, float] = field(default_factory=dict)  #: of words on the line
@@ -222,8 +222,9 @@ class Coordinates(CorrectionMethod):
             wanted, goal = goal, _same_pecks(block, words[0], goal, frame.digits)
             if held and goal != wanted:
                 raise block.error(
-                    f"Q divides the way from R to {words[0]}, so rounding decides whether there is one peck more, and "
-                    "the tool is at R, which must not move: write G80 and a rapid above R before, or use --expand",
+                    f"Q divides the distance from R to {words[0]} without remainder, so that rounding decides the "
+                    "number of pecks, and R cannot be shifted because the tool is there: first write G80 and a rapid "
+                    "above R, or use --expand",
                 )
         if goal != self._cycle or all(word in block.words for word in words):
             edit.added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
@@ -270,7 +271,7 @@ class Coordinates(CorrectionMethod):
     def _hurries(self, block: Block, frame: Frame, goal: Vector, holds: tuple[int, ...]) -> bool:
         """Return whether a change of the correction would change the duration of a cut beyond the allowed limits.
 
-        Axes with uncertain positions are included if the line names them: they may not have been moved by hand.
+        Axes with uncertain positions are included if the line names them: perhaps they were not moved by hand.
         """
         if len(block.moves) != 1 or block.moves[0].rapid or not block.moves[0].feed:
             return False

@@ -1,6 +1,6 @@
-"""What is recorded while a program is revised: its course, for a figure, and whether it stays within the travel.
+"""Recorders of a revision: the course of the program, for a figure, and whether it stays within the travel.
 
-A program beyond the travel of the machine is wrong, or the given origins are.
+If a program exceeds the travel of the machine, either the program or the given origins are wrong.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Update of the correction in a program, and the drift that remains, at the given work offsets or others."""
+"""Update of the correction in a program, and the drift that remains, with the given work offsets or with others."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -94,7 +94,7 @@ class Demand:
         if max(abs(x), abs(y), abs(z)) > self.most:
             raise InputError(
                 f"the correction after {time:.0f} s would be X {x:.0f}, Y {y:.0f}, Z {z:.0f} um: more than "
-                f"{self.most:g} um is no thermal drift; check the model, its unit and the start state"
+                f"{self.most:g} um is not plausible as thermal drift; check the model, its unit and the start state"
             )
         self._force = x, y, z
         return self._force
@@ -160,7 +160,7 @@ def _range(vectors: Sequence[tuple[float, ...]]) -> tuple[Vector, Vector]:
 
 @dataclass
 class Elsewhere:
-    """Error with other work offsets: the drift in the cuts, compared with that 100 mm away, both ways along each axis.
+    """Error with other work offsets: the drift in the cuts, compared with that 100 mm away in both axis directions.
 
     Parameters
     ----------

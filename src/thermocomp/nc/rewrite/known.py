@@ -72,9 +72,9 @@ def refuse_untold_rotation(block: Block, carried: Vector) -> None:
     if not (carried[0] or carried[1]) or block.modal.rotation_told:
         return
     name, told = system_name(block.modal.system), block.modal.system_told
-    which = f"write {name} before the first move, and which (--rotation '{name}=12 deg')"
+    which = f"write {name} before the first move, and state the angle (--rotation '{name}=12 deg')"
     raise block.error(
         f"X or Y is corrected, and a rotation of {name if told else 'the work coordinate system in force'} that is "
-        "stored in the controller (G10 L2 R) would turn that: state that there is none (--rotation none) or "
-        + (f"which (--rotation '{name}=12 deg')" if told else which),
+        "stored in the controller (G10 L2 R) would turn the correction: state that there is none (--rotation none) or "
+        + (f"the angle (--rotation '{name}=12 deg')" if told else which),
     )

@@ -134,8 +134,8 @@ class CorrectionMethod(ABC):
         unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
         if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
             raise block.error(
-                f"turns a rotary axis at feed rate; whether {unknown[0]} moves is unknown, which decides whether F "
-                f"counts degrees: position {' '.join(unknown)} by a rapid before",
+                f"turns a rotary axis at feed rate; F is in degrees only if {unknown[0]} does not move, which is "
+                f"unknown: first position {' '.join(unknown)} by a rapid",
             )
         return not moves and not (unknown and ROTARY.isdisjoint(block.words) and block.moves[-1].rapid)
 
@@ -174,12 +174,14 @@ class CorrectionMethod(ABC):
         if axes and self.frame(block).turned and {0, 1} & set(axes):
             axes = sorted({0, 1, *axes})
             if any(self.carried[i] for i in axes if i not in self.named(block) and i != 2):
-                raise block.error("a move in machine coordinates of X or Y alone while the coordinates are rotated")
+                raise block.error(
+                    "a move in machine coordinates of X or Y alone while the coordinates are rotated; move both axes"
+                )
         fed = any(not m.rapid for m in block.moves)
         if fed and not ROTARY.isdisjoint(block.words) and any(self.carried[i] or self.doubtful[i] for i in axes):
             raise block.error(
                 "turns a rotary axis at feed rate on the way to machine coordinates, where X, Y and Z remove the "
-                "correction: if they stop, F would no longer count degrees; write G53 G0, or a line for each",
+                "correction, so that F may no longer be in degrees; write G53 G0, or separate lines",
             )
         after = list(self.carried)
         for i in axes:

@@ -1,6 +1,6 @@
 """Correction by offset: ``G52`` shifts the whole work coordinate system, only where this cannot mark the part.
 
-``G52`` is absolute, is in force whenever written, and is the same in LinuxCNC and Fanuc. A new one is written at
+``G52`` is absolute, takes effect wherever it is written, and is the same in LinuxCNC and Fanuc. A new one is written at
 safe points only: the tool is up, no cutter compensation or cycle is on, and the next block is a rapid in G90. The words
 of the program are unchanged.
 """
@@ -62,7 +62,7 @@ class Offset(CorrectionMethod):
             before = self._stay(block, frame)
         elif block.ends and self._begun:
             if block.modal.cutter:
-                raise block.error("the program ends during cutter radius compensation; write G40 before")
+                raise block.error("the program ends during cutter radius compensation; write G40 before its end")
             before = self._update(block, frame, (0.0, 0.0, 0.0))
         self._carry(block, frame)
         self._look_up(block)
@@ -88,7 +88,7 @@ class Offset(CorrectionMethod):
         )
 
     def _near(self, block: Block) -> bool:
-        """Return whether a cycle begins at its R, so that the order of levels is critical, or at the tool position."""
+        """Return whether a cycle starts at its first hole, or at R, where the order of the levels is critical."""
         first, second, drill = PLANES[block.modal.plane]
         if all(self.before[i] and abs(block.end[i] - block.start[i]) <= STILL for i in (first, second)):
             return True

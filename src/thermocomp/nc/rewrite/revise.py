@@ -328,11 +328,11 @@ class Revision:
         if max(map(abs, map(sub, demand, ends[1]))) > tolerance:
             self._why = self.method.held_by(block)
         elif self.demand.every is not None:
-            self._why = "the time between renewals"
+            self._why = "the time between updates"
         elif gap > max(map(abs, map(add, drift, ends[0]))):
-            self._why = "the length of the line, along which the drift is uneven"
+            self._why = "the length of the line, along which the drift is not linear"
         else:
-            self._why = self._why or "the moves before the cut, which could not take it up"
+            self._why = self._why or "the moves before the cut, in which the correction could not change"
         if gap > self.held.get(self._why, (0.0, 0))[0]:
             self.held[self._why] = gap, block.line.number
 

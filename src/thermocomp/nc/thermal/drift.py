@@ -85,10 +85,10 @@ class Drift:
             raise InputError(f"drift: step {step} s must be positive and finite")
         if zero == "last" and start.zeros is None:
             raise InputError(
-                "drift: counting from the zero of the last job needs a state that is carried over; found none"
+                "drift: the zero of the last job requires the state carried over from that job; found none"
             )
         if check_stations(stations) != list(stations) or len(start.states) != len(stations):
-            raise InputError("drift: stations must be ordered by axis and position, as 'stations' gives them")
+            raise InputError("drift: stations must be ordered by axis and position, as returned by 'stations'")
         self.stations = tuple(stations)
         self.step = step
         self.assumed = start.assumed

@@ -59,7 +59,7 @@ class InputSignal:
     def __post_init__(self) -> None:
         if not self.time or len(self.time) != len(self.values):
             raise InputError(
-                f"forecast: {len(self.time)} times and {len(self.values)} values: expected as many of both, at least 1"
+                f"forecast: {len(self.time)} times and {len(self.values)} values: expected equal numbers, at least 1"
             )
         if not all(map(math.isfinite, (*self.time, *self.values))):
             raise InputError("forecast: times and values must be finite numbers")
@@ -94,7 +94,7 @@ Inputs = Mapping[str, InputSignal]
 class Wiring:
     """Sources of the inputs of one model.
 
-    An input of quantity ``spindle_speed`` gets the speed of the program; an input without influence on the deviation
+    An input of quantity ``spindle_speed`` gets the speed of the program; an input that does not affect the deviation
     needs no source.
 
     Parameters

@@ -53,7 +53,8 @@ class JobState:
     Parameters
     ----------
     zero_known : bool
-        The deviation that counts as zero is not a prediction: the machine was cold at that time, or measured.
+        The deviation that counts as zero is not a prediction: the machine was cold at that time, or the deviation was
+        measured.
 
     Raises
     ------

@@ -27,7 +27,7 @@ _LONG = 2 * 86400.0
 
 
 class ThermalStart(NamedTuple):
-    """State of the models at the start of the program, or earlier by a pause of the spindle."""
+    """State of the models at the start of the program, or at the start of a pause before it."""
 
     states: tuple[State, ...]  #: per station
     known: bool  #: the state is not a prediction: the machine is cold or measured
@@ -103,15 +103,15 @@ def begin_measured(stations: Sequence[Station], deviations: Mapping[str, float],
         if len(named) not in (1, len(mine)) and axis not in deviations:
             missing = next(s for s in mine if not told[str(s)])
             what, name = (missing, _names(missing)[0]) if named else (axis, axis)
-            raise InputError(f"measured start: that of {what} is missing; also give {name}=VALUEum")
+            raise InputError(f"measured start: the deviation of {what} is missing; also give {name}=VALUEum")
         for group, seen, deviation in parts:
             found, speed = _explaining(group, seen, others, deviation)
             states |= {str(s): state for s, state in zip(group, found, strict=True)}
             if len(group) > 1:
                 what = f"the mean of its {len(mine)} models" if seen is group else told[str(seen[0])]
                 assumed.append(
-                    f"{axis} was measured once: all its models begin as {speed:.0f} 1/min, held for long, leaves "
-                    f"them: there {what} is {deviation:g} um"
+                    f"{axis} was measured once: all its models start from the state after a long run at {speed:.0f} "
+                    f"1/min, where {what} is {deviation:g} um"
                 )
     return ThermalStart(tuple(states[str(s)] for s in stations), known=True, assumed=tuple(assumed))
 

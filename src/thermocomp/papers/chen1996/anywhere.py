@@ -53,7 +53,7 @@ class Volume:
     errors : mapping of str to ndarray of shape (n, 3)
         Errors by type of compensation [um].
     causes : mapping of str to ndarray of shape (n, 3)
-        Residuals with all components by cause, including that at the start of the test [um].
+        Residuals after compensation with all components, by cause, including the error at the start of the test [um].
     by_component : mapping of str to float
         RMS effect of the error of each component on the tool point [um].
     closure : float
@@ -143,7 +143,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
 
 
 def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> Iterator[tuple[Any, ...]]:
-    """Yield what `_Points` has of each point."""
+    """Yield the fields of `_Points` for each point."""
     model = VolumetricModel(learned.machine)
     recording = virtual.make_recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
@@ -245,7 +245,7 @@ def _lines(found: Volume) -> Facts:
 
 
 def numbers(found: Volume) -> dict[str, float]:
-    """Return the numbers asserted by the documentation."""
+    """Return the key numbers, which the gallery page checks."""
     sizes = {name: rms(size) for name, size in found.sizes.items()}
     return exhibits.numbers("anywhere", found, gain=found.gain(), gain_lines=found.gain(LINES), rms=sizes)
 

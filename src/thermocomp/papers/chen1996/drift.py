@@ -75,7 +75,7 @@ class LearnedDrift:
         Additional models to show the effect of the subgroups: stepwise regressions on all nine temperatures, as for the
         net.
     nets : sequence of LearnedNet
-        9-20-3 nets, each from other starting weights.
+        9-20-3 nets, each from different starting weights.
     others : mapping of str to sequence of LearnedNet
         Methods that the paper tried and rejected (C-26, C-28, C-30).
     """
@@ -132,7 +132,7 @@ class LearnedDrift:
 
     @property
     def independent(self) -> dict[str, float]:
-        """Number of independent rows equivalent to their residuals."""
+        """Effective sample size of the training rows, from the residuals of each regression."""
         return {t: r.n_effective_ for t, r in self.regressions.items()}
 
     @property

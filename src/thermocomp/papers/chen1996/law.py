@@ -57,8 +57,8 @@ class Design:
     runs : int
         Number of laser runs, whose mean is a profile; the temperatures are means over the same runs.
     centred : bool
-        Temperatures and slopes are relative to the mean of all states of their test; else to the first state, as
-        in Chen's work.
+        Whether temperatures and slopes are relative to the mean of all states of their test; otherwise to the first
+        state, as in Chen's work.
     laser, sensor : float
         See `LASER` and `SENSOR`.
     hierarchy : bool
@@ -305,7 +305,7 @@ def _within(found: Law) -> Facts:
 
 
 def numbers(found: Law) -> dict[str, float]:
-    """Return the numbers asserted by the documentation."""
+    """Return the key numbers, which the gallery page checks."""
     ours, paper, cold = (found.recoveries[d] for d in (OURS, DESIGNS[0], DESIGNS[1]))
     return exhibits.numbers("law", found, ours=ours, paper=paper, cold=cold)
 

@@ -42,7 +42,7 @@ class LearnedPositioning:
     fits : mapping of str to PositionFit
         Fits to `learned` by method; for the nets the one with the median error after training.
     nets : sequence of PositionFit
-        5-8-1 nets, each from other starting weights.
+        5-8-1 nets, each from different starting weights.
     linear : PositionFit
         Stepwise regression on first-order terms only.
     law : Law
@@ -146,7 +146,7 @@ length = Claims[LearnedPositioning](__name__, setup, section="length")
 
 
 def judge(found: LearnedPositioning) -> tuple[Claim, ...]:
-    """Return all claims, those on the known law before that on a length."""
+    """Return all claims, in order: positioning, known law, length error."""
     return claims(found) + law.claims(found.law) + length(found)
 
 
@@ -214,7 +214,7 @@ def largest_length_error(found: LearnedPositioning) -> dict[str, float]:
 
 
 def numbers(found: LearnedPositioning) -> dict[str, float]:
-    """Return the numbers asserted by the documentation."""
+    """Return the key numbers, which the gallery page checks."""
     made = exhibits.numbers("slope", found, r2_net=np.median(found.net_r2), lateral=largest_length_error(found))
     return made | law.numbers(found.law)
 

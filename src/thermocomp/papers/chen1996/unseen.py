@@ -215,7 +215,7 @@ def _length(residuals: Mapping[str, Mapping[str, FloatArray]], method: str) -> F
 
 
 def numbers(found: Unseen) -> dict[str, float]:
-    """Return the numbers asserted by the documentation: RMS, medians for the nets, and largest errors."""
+    """Return the key numbers, which the gallery page checks: RMS, medians for the nets, and largest errors."""
     short = {NONE: "none", MRA: "mra", NET: "net", DYNAMIC: "dynamic"}
     made: dict[str, float] = {}
     for t in DRIFTS:
@@ -234,7 +234,7 @@ def numbers(found: Unseen) -> dict[str, float]:
 
 
 def tables(found: Unseen) -> list[StudyTable]:
-    """Return the residuals of x, y and z in each new test, and the number of independent rows."""
+    """Return the residuals of x, y and z in each new test, and the effective sample sizes."""
     residuals = {
         (f"{t}, {name}", method): e
         for name, tests in zip(TESTS, found.residuals, strict=True)
@@ -243,7 +243,7 @@ def tables(found: Unseen) -> list[StudyTable]:
     }
     errors = common.errors_table("New tests: error without and with compensation", residuals)
     rows = [[*row, f"{effective_sample_size(e):.0f}"] for row, e in zip(errors.rows, residuals.values(), strict=True)]
-    return [StudyTable(errors.caption, (*errors.header, "independent rows"), rows)]
+    return [StudyTable(errors.caption, (*errors.header, "effective rows"), rows)]
 
 
 def figures(found: Unseen) -> list[Figure]:

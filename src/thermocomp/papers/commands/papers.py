@@ -108,7 +108,7 @@ def papers(
         if CROSS not in chosen:
             raise InputError(f"{option} is for {CROSS}: thermocomp papers {CROSS} {option} ...")
         if not measured and option in ("--mapping", "--target"):
-            raise InputError(f"{option} is for measured recordings: name them by --with")
+            raise InputError(f"{option} is for measured recordings: give them with --with")
     if output is not None:
         refuse_existing([output], overwrite, measured, ".html")
     tests = read_recordings(measured, mapping) if measured else []
@@ -144,11 +144,11 @@ def _check_numbers(seed: int, repeats: int, jobs: int) -> None:
     if repeats < 1:
         raise InputError(f"--repeats {repeats}: must be at least 1")
     if jobs == 0:
-        raise InputError("--jobs 0: name a number of processes, or -1 for all cores")
+        raise InputError("--jobs 0: give a number of processes, or -1 for all cores")
 
 
 def _tried(name: str, run: "Callable[..., Study]", progress: "Told") -> "Study":
-    """Return a study, or if it fails one with the reason, so that the other studies still run."""
+    """Return a study; if it fails, a substitute that states the reason, so that the other studies still run."""
     from thermocomp.judging.pieces import explain
     from thermocomp.papers.studies import not_redone
 

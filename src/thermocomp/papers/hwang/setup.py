@@ -73,7 +73,7 @@ def samples_of(tests: Sequence[Recording]) -> Samples:
 
 
 def nearest(found: Sequence[Interval], groups: int) -> Interval:
-    """Return the threshold interval whose number of groups is nearest to `groups`; the widest of several."""
+    """Return the threshold interval whose number of groups is nearest to `groups`; if there are several, the widest."""
     return min(found, key=lambda i: (abs(len(i.groups) - groups), i.low - i.high))
 
 
@@ -93,7 +93,7 @@ def polynomial(samples: Samples, names: Sequence[str], degree: int) -> PaperFit:
 
 
 def agreement(groups: Groups) -> float:
-    """Return the share of sensor pairs that are together, or apart, as in Table 1."""
+    """Return the share of sensor pairs that are in the same group, or in different groups, as in Table 1."""
     ours = {n: k for k, g in enumerate(groups) for n in g}
     paper = {n - 1: k for k, g in enumerate(TABLE_1) for n in g}
     pairs = [(a, b) for a in paper for b in paper if a < b]

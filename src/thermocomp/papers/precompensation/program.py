@@ -93,7 +93,7 @@ def _speeds(test: Recording) -> FloatArray:
 
 
 def _stretches(test: Recording, borders: Sequence[float]) -> Iterator[tuple[float, float, float]]:
-    """Yield start and end [s] of periods of constant spindle speed [1/min]; no period crosses a border."""
+    """Yield start and end [s] of periods of constant spindle speed [1/min]; no period crosses a boundary."""
     speed, begin = _speeds(test), float(test.time[0])
     for k in range(1, len(speed)):  # the speed in a row is that of the preceding interval
         end = float(test.time[k])

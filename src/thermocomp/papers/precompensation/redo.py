@@ -96,7 +96,7 @@ def _tables(c: Computed) -> tuple[StudyTable, ...]:
     left = {(f"z at {p} mm", name): e[:, j] for j, p in enumerate(POSITIONS) for name, e in c.left.items()}
     return (
         exhibits.table("orders", [(k, [_fpe(table.get((k, m))) for m in order]) for k in order]),
-        errors_table("Free run in the verification: what is left", left),
+        errors_table("Free run in the verification: residual", left),
         exhibits.table("clocks", [(h / 60, *clock) for h, clock in c.clocks.items()]),
         exhibits.table("cuts", [(n, k.without, k.scheduled) for n, k in enumerate(c.cuts, start=1)]),
     )

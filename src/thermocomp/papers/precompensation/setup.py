@@ -183,7 +183,7 @@ def compute(seed: int, progress: Progress) -> Computed:
         hidden.append(net.hidden_)
         ahead = paper.one_step(judge.frame(), judge.deviations[:, number], dt=judge.dt())
         steps.append(ahead[:, 0] - ahead[:, 1])
-    progress(0.5, "other steps of time")
+    progress(0.5, "other sampling intervals")
     clocks = {h: _clock(learn, judge, h, timed) for h in INTERVALS}
     progress(0.6, "cutting tests")
     cuts = [cut(record("precompensation-cut", seed=seed + n)[0], models[NET]) for n in range(CUTS)]

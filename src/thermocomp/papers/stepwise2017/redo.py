@@ -101,7 +101,7 @@ def _tables(c: Computed) -> tuple[StudyTable, ...]:
     tests = (("fit", c.left_in_fit), ("on-line", c.left))
     return (
         exhibits.table("steps", steps),
-        errors_table("What the methods leave", {(what, m): e for what, left in tests for m, e in left.items()}),
+        errors_table("Residuals of the methods", {(what, m): e for what, left in tests for m, e in left.items()}),
         exhibits.table("thinned", [(t, list(map(_place, t.names))) for t in c.thinned]),
     )
 

@@ -48,7 +48,7 @@ class Thinned:
     Parameters
     ----------
     effective : float
-        Number of independent rows equivalent to the residual.
+        Effective sample size of the rows, from the residual.
     first : float
         R2 required for the first variable to enter.
     names : tuple of str
@@ -115,7 +115,7 @@ class Computed:
 
     @cached_property
     def worth(self) -> float:
-        """Number of independent rows equivalent to the stepwise fit."""
+        """Effective sample size of the training rows, from the residuals of the stepwise model."""
         return effective_sample_size(self.left_in_fit[STEPWISE])
 
 

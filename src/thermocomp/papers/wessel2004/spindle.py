@@ -46,7 +46,7 @@ class Spindle:
     recordings : sequence of Recording
         Learned and estimated recording.
     peaked : MillingTrial
-        Trial with the wider series as the estimated one: `found`, or with the two series exchanged.
+        Trial in which the series with the wider span is estimated: `found`, or a trial with the two series exchanged.
     """
 
     recordings: Sequence[Recording]

@@ -71,7 +71,7 @@ class MillingTrial:
 
     @property
     def beyond(self) -> BoolArray:
-        """Rows of the unseen test with a displacement outside the training range by more than `SLIGHT` of it."""
+        """Rows of the unseen test with a displacement outside the training range by more than `SLIGHT` of its span."""
         seen = self.learned.deviations[:, 0]
         margin = SLIGHT * np.ptp(seen)
         return np.asarray((self.measured < seen.min() - margin) | (self.measured > seen.max() + margin))
@@ -133,7 +133,7 @@ class MillingTrial:
         return {m: self.rms(m) for m in self.estimates if m not in methods}
 
     def reasons(self) -> Facts:
-        """Return the limits of the estimate by ACE, and the results of linear regression and of a memory."""
+        """Return the limits of the estimate by ACE, and the results of linear regression and of a model with memory."""
         error, out, reach = self.residual(ACE_NAME), self.flagged, self.reach()
         wide = reach >= np.quantile(reach, 0.9)
         linear = np.corrcoef(self.learned.deviations[:, 0], self.fits[MLR_NAME])[0, 1]
@@ -162,8 +162,9 @@ def trial(
 ) -> MillingTrial:
     """Learn from all recordings except the last, and estimate the last.
 
-    Absolute temperatures are used, as in the paper, whose laptop receives temperatures. If the tests do not start at
-    equal temperatures, both methods are repeated with temperatures relative to each start, like the displacements.
+    Absolute temperatures are used, as in the paper, where the laptop receives the temperatures as measured. If the
+    tests do not start at equal temperatures, both methods are repeated with temperatures relative to each start, like
+    the displacements.
     """
     parts = (recordings[:-1], recordings[-1:])
     learned, unseen = (stacked(r, displacement, temperatures) for r in parts)

@@ -44,13 +44,13 @@ class _Fits:
 def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None) -> Iterator[Finding]:
     """Yield findings on groups of channels whose clock differs from the clock of the spindle speed.
 
-    Heat follows the spindle through first-order lags: each channel's changes from minute to minute (or row to row)
-    are regressed on the changes of speed and squared speed with lags of 2 min to 3 h, with the channel shifted by
-    -40 to 40 min. Sums of such lags can represent any slow response, but neither one that precedes its cause nor a
-    sharp one that comes late. All temperatures, or all displacements, are tested jointly; the result is trouble where a
-    shift of 8 min and two rows or more improves the log-likelihood by over 60. Channels of an otherwise sound group are
-    reported if they lead by as much; if they lag, only two or more together, each with a gain in log-likelihood of over
-    100, because a remote sensor may respond late.
+    Heat follows the spindle through first-order lags: each channel's changes from minute to minute (or row to row) are
+    regressed on the changes of speed and squared speed with lags of 2 min to 3 h, with the channel shifted by -40 to 40
+    min. Sums of such lags can represent any slow response, but neither one that precedes its cause nor a sharp one that
+    comes late. All temperatures, or all displacements, are tested jointly; trouble is reported if a shift of at least 8
+    min and two rows improves the log-likelihood by over 60. Channels of an otherwise sound group are reported if they
+    lead by as much; if they lag, only two or more together, each with a gain in log-likelihood of over 100, because a
+    remote sensor may respond late.
 
     No result is given for a test without speed or with fewer than two speed changes, for one shorter than 2 h 20 min,
     or for channels that do not respond to the spindle. In a test with a periodic speed the reported shift may be wrong
@@ -82,8 +82,9 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
     for quantity, (shift, names) in told.items():
         others = len(groups[quantity]) - len(names)
         who = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-        rest = f"; the other {others} {quantity}s do not answer clearly: those of the same logger need the same" * (
-            others > 0
+        rest = (
+            f"; the other {others} {quantity}s do not respond clearly: those of the same logger need the same shift"
+            * (others > 0)
         )
         moved: dict[str, object] = {"do": "shift", "channels": names, "by_s": -shift}
         if others:  # only the user knows which logger recorded these channels
@@ -161,9 +162,9 @@ def _disagree(group: Sequence[Signal], fits: _Fits) -> tuple[float, list[str]] |
 def _text(who: str, shift: float) -> str:
     minutes = abs(shift) / 60
     way, remedy = ("before", "later") if shift < 0 else ("after", "earlier")
-    cannot = "before its cause" if shift < 0 else "late and yet as sharply"
+    cannot = "before its cause" if shift < 0 else "so late and yet so sharply"
     return (
-        f"the clocks of two loggers differ: about {minutes:.0f} min {way} the spindle speed changes come the answers "
-        f"of {who}, and heat does not come {cannot}; put these columns {minutes:.0f} min {remedy}, or the speed the "
-        "other way"
+        f"the clocks of two loggers differ: the responses of {who} come about {minutes:.0f} min {way} the changes of "
+        f"the spindle speed, but heat cannot act {cannot}; shift these columns {minutes:.0f} min {remedy}, or the "
+        "speed the other way"
     )

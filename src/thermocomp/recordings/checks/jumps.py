@@ -32,7 +32,7 @@ class Edges:
     height : ndarray of shape (n_jumps,)
         Height in the unit of the channel.
     clear : ndarray of bool of shape (n_jumps,)
-        Certain on its own; other jumps need a second channel with the opposite jump.
+        Certain without further evidence; other jumps require a second channel with the opposite jump.
     """
 
     signal: Signal
@@ -164,7 +164,7 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
     text = (
         f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "
         "or probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract "
-        "the step behind it, or leave the channel out"
+        "the step after it, or leave the channel out"
     )
     times = sorted(float(time[mine.after[j]]) for j in lone)
     zeroed = [{"do": "rezero", "channels": [channel.name], "at": t, "reason": "step"} for t in times]
@@ -188,8 +188,8 @@ def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) ->
 
 def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
     text = (
-        f"changes places with {b.channel.name} at {at_row(row, time)}: each continues where the other was. Swap these "
-        "columns back from there on, or leave both out"
+        f"is exchanged with {b.channel.name} at {at_row(row, time)}: each continues at the level of the other. Swap "
+        "these columns back from there on, or leave both out"
     )
     names = sorted([a.channel.name, b.channel.name])  # both report the same step
     back = {"do": "swap", "channels": names, "at": float(time[row])}

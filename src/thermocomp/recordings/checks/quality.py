@@ -164,9 +164,8 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
     least, most = PLAUSIBLE[channel.quantity]
     row = int(wild[np.argmax(np.abs(values[wild]))])
     text = (
-        f"{count(wild.size, 'value')} of {len(values)} beyond {least:g} to {most:g} {channel.unit}, the farthest "
-        f"{values[row]:g} at {at_row(row, time)}: no {channel.quantity} of a machine; check unit, scale, zero and "
-        "sensor"
+        f"{count(wild.size, 'value')} of {len(values)} outside {least:g} to {most:g} {channel.unit}, the most extreme "
+        f"{values[row]:g} at {at_row(row, time)}: implausible for a machine; check unit, scale, zero and sensor"
     )
     if wild.size == np.isfinite(values).sum():
         return Finding("trouble", channel.name, "implausible", text)
@@ -175,7 +174,9 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
 
 def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
     sensed = channel.quantity in _SENSED
-    advice = "check whether the sensor is connected, or leave the channel out" if sensed else "it tells models nothing"
+    advice = (
+        "check whether the sensor is connected, or leave the channel out" if sensed else "it is of no use to models"
+    )
     text = f"is {x[0]:g} {channel.unit} in all {len(x)} rows; {advice}"
     gone = column(channel.name, role="ignore")
     return Finding("trouble" if sensed else "info", channel.name, "constant", text, remedy=gone)
@@ -187,7 +188,7 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
     Too few: under 10. Gap: over 5 times the 90 % quantile of the intervals. Irregular: intervals vary by over 20 %.
     """
     if len(time) < 10:
-        text = f"has only {count(len(time), 'row')}, too few to say anything; record a whole warm-up and cool-down"
+        text = f"has only {count(len(time), 'row')}, too few to assess; record a whole warm-up and cool-down"
         yield Finding("warning", "", "short", text)
     if len(time) < 3:
         return
@@ -199,16 +200,16 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
         longest = int(gaps[np.argmax(steps[gaps])])
         text = (
             f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at_row(longest, time)}, "
-            f"where rows are {usual:g} s apart; a model's memory is unsure behind it: split the test there or "
-            "record it again"
+            f"where rows are {usual:g} s apart; the state of a model with a memory is uncertain after it: split the "
+            "test there or record it again"
         )
         yield Finding("warning", "", "gap", text, row=longest)
     kept = steps[steps <= 5 * usual]
     low, middle, high = (float(q) for q in np.quantile(kept, (0.05, 0.5, 0.95)))
     if high - low > 0.2 * middle:
         text = (
-            f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); "
-            "resample for methods that need one interval"
+            f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); resample for methods that require a "
+            "constant interval"
         )
         # long enough for a row in every interval
         even = {"clean": [{"do": "resample", "every_s": float(np.ceil(kept.max()))}]}
@@ -225,8 +226,8 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
         why = "the spindle does not start again"
         if runs > 1:
             why = (
-                f"none of the spindle's {runs} starts has a stop and a run of {SPLITS:.0f} s about it (are the times "
-                "minutes or hours? Then state it in a mapping: [time] unit)"
+                f"none of the spindle's {runs} starts has a stop of {SPLITS:.0f} s before it and a run of {SPLITS:.0f} "
+                "s after it (are the times minutes or hours? Then state it in a mapping: [time] unit)"
             )
     text = (
         f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"
@@ -283,14 +284,14 @@ def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -
         yield Finding("trouble", name, "missing values", text, remedy=column(name, role="ignore"))
         return
     if probed:
-        text = f"has {len(values) - n} values in {len(values)} rows, as others have: probing cycles"
+        text = f"has {len(values) - n} values in {len(values)} rows, the same as other displacements: probing cycles"
         yield Finding("info", name, "probed", f"{text}; models see only these rows")
         return
     starts, lengths = runs(gone)
     starts, lengths = starts[gone[starts]], lengths[gone[starts]]
     longest = int(np.argmax(lengths))
     text = (
-        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} "
-        f"in a row from {at_row(int(starts[longest]), time)}; models skip these rows: mend the sensor if they are many"
+        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} in a row "
+        f"from {at_row(int(starts[longest]), time)}; models skip these rows: repair the sensor if there are many"
     )
     yield Finding("trouble" if n > 0.2 * len(values) else "warning", name, "missing values", text)

@@ -44,9 +44,9 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
         first, last = int(rows[starts[k]]), int(rows[starts[k] + lengths[k] - 1])
         more = f", one of {len(hits)} such stretches" if len(hits) > 1 else ""
         text = (
-            f"stands still at {x[starts[k]]:.6g} {channel.unit} for {lengths[k]} rows, from {at_row(first, time)} to "
-            f"{at_row(last, time)}{more}, while it moves from row to row right beside; check the sensor, then delete "
-            "the values or leave the channel out"
+            f"is constant at {x[starts[k]]:.6g} {channel.unit} for {lengths[k]} rows, from {at_row(first, time)} to "
+            f"{at_row(last, time)}{more}, although it varies from row to row before or after; check the sensor, then "
+            "delete the values or leave the channel out"
         )
         # the first value of each section may be a real measurement
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])

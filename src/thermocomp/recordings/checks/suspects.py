@@ -59,8 +59,8 @@ def _rank_correlation(a: Signal, b: Signal) -> float:
 
 def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: float) -> Finding:
     text = (
-        f"lies between {low:.4g} and {high:.4g} degC all the time, which no machine does; as {unit} its coldest would "
-        f'be {coldest:.1f} degC. Say so in a mapping: unit = "{unit}"'
+        f"lies between {low:.4g} and {high:.4g} degC all the time, which no machine does; as {unit} its lowest value "
+        f'would be {coldest:.1f} degC. If so, state it in a mapping: unit = "{unit}"'
     )
     return Finding("trouble", signal.channel.name, "unit", text, remedy=column(signal.channel.name, unit=unit))
 
@@ -93,8 +93,8 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
             continue
         against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
         text = (
-            f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these "
-            'mm? Then state it in a mapping: unit = "mm"; else the probe does not touch'
+            f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these mm? Then "
+            'state it in a mapping: unit = "mm"; otherwise the probe is not in contact'
         )
         severity: Severity = "trouble" if warming >= 1 else "warning"
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
@@ -124,7 +124,7 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Find
     if interval > 3600:
         told = f"rows are {interval:.6g} s ({interval / 3600:.3g} h) apart"
     elif fastest > 86400:
-        told = f"most temperatures take over {fastest / 86400:.3g} days for half of what they move by"
+        told = f"most temperatures take over {fastest / 86400:.3g} days for half of their range"
     else:
         return
     text = (
@@ -169,9 +169,9 @@ def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
         if abs(start) > max(2.0, 0.05 * s.span, 6 * s.noise):
             unit = s.channel.unit
             text = (
-                f"starts at {start:.3g} {unit}, not near its zero; models count from zero at the start. If the test "
-                "is the continuation of another, join them; else take its first value for zero in a mapping: "
-                'zero = "first"'
+                f"starts at {start:.3g} {unit}, not near its zero; models assume zero at the start. If the test is the "
+                "continuation of another, join them; otherwise use its first value as zero in a mapping: zero = "
+                '"first"'
             )
             row = int(s.rows[0])
             zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(time[row]), "to": 0.0}

@@ -77,11 +77,11 @@ def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -
             continue
         first = cells.dropna().iloc[0]
         said = (
-            f"{name!r} says {_shown(cells.iloc[row])} in {table.place(row)}, which is not the day "
-            f"{time[row] / 3600:.2f} h after {_shown(first)}, as the time in {heading!r} says"
+            f"{name!r} contains {_shown(cells.iloc[row])} in {table.place(row)}, which is not the day "
+            f"{time[row] / 3600:.2f} h after {_shown(first)}, as the time in {heading!r} requires"
         )
         if ignored:
-            notes.append(f"left out, as the mapping says: {said}; the times between the rows may be wrong by days")
+            notes.append(f"left out, as the mapping specifies: {said}; the times between the rows may be wrong by days")
             continue
         use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if form else {})}}
         usable = is_stamp and k != date and (k not in others or is_compact_date([str(first)]))

@@ -48,7 +48,7 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
         return DateChoice(next(iter(readings)), "", "")  # day and month are equal, as on the fifth of May
     rising = [order for order, t in readings.items() if rises(t)]
     if len(rising) == 1:
-        return DateChoice(rising[0], "rising", "otherwise time would not rise")
+        return DateChoice(rising[0], "rising", "otherwise time would not increase")
     tried = {order: readings[order] for order in rising or readings}
     steps = {order: np.diff(t) for order, t in tried.items()}
     first, *more = steps.values()

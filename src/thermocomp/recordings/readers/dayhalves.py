@@ -80,13 +80,13 @@ def join_halves(
         raise TwoReadingsError(
             f"{table.path}: {table.place(row)}: {half!r} specifies {halves.iloc[row]}, and {time!r} {clocks.iloc[row]}"
             + (
-                ", of 24 hours, as other rows show: correct the one or the other, "
+                ", in 24-hour time, as other rows show: correct one of them, "
                 if whole_day
-                else f", which the format {form!r} takes for 24 hours: write %I for the hours and end it with %p, "
+                else f", which the format {form!r} reads as 24-hour time: write %I for the hours and end it with %p, "
             )
             + f'or leave {half!r} out by a mapping: [columns."{half}"] role = "ignore"',
             [] if whole_day else [{"time": {"column": time, "format": f"{form.replace('%H', '%I')} %p"}}, ignore],
         )
     twelve = texts.str.replace(r"(?<![\d:])0?0(?=:\d\d(?!\d))", "12", n=1, regex=True)  # 00:31 AM
     joined = (twelve + " " + after.map({True: "PM", False: "AM"})).where(there)
-    return joined, (f"{half!r} says AM and PM of {time!r}",)
+    return joined, (f"{half!r} specifies AM and PM for {time!r}",)

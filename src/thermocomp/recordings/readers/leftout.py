@@ -36,16 +36,18 @@ def why_left_out(heading: str) -> str:
         meant = find_unit(symbol)
     except UnitError:
         near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
-        known = f"the nearest are {', '.join(near)}" if near else f"known are {', '.join(HOUSE_SUFFIX)} and others"
+        known = (
+            f"the nearest are {', '.join(near)}" if near else f"known units are {', '.join(HOUSE_SUFFIX)} and others"
+        )
         return (
-            f"{heading!r}: {symbol!r} is no known unit, {known}; correct the heading, or write {mapped} role and unit, "
-            f"or {ignore}"
+            f"{heading!r}: {symbol!r} is not a known unit, {known}; correct the heading, or write {mapped} role and "
+            f"unit, or {ignore}"
         )
     if meant.quantity == "time":
         return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is no time"
     return (
-        f"{heading!r}: {symbol!r} counts as a unit of {meant.quantity} only by a mapping; write {mapped} "
-        f'role = "{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
+        f"{heading!r}: {symbol!r} is read as a unit of {meant.quantity} only with a mapping; write {mapped} role = "
+        f'"{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
     )
 
 

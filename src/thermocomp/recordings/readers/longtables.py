@@ -58,8 +58,8 @@ def read_long(path: str | Path, mapping: Mapping | None, options: ProfileOptions
     if stuck.size:
         row = int(first[stuck[0] + 1])
         raise RecordingError(
-            f"{rows.source}: {rows.place(row)}: a new state begins at the time of the one before; correct the time, or "
-            "the column of states"
+            f"{rows.source}: {rows.place(row)}: a new state begins at the same time as the previous one; correct the "
+            "time, or the column of states"
         )
     return Profiles(
         target=options.target,
@@ -111,8 +111,8 @@ def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str
     found = [name for name in wanted if name in there]
     if not found:
         raise RecordingError(
-            f"{owner}: no column of positions is called {' or '.join(wanted)}; name it so, or state which it is. There "
-            f"are {', '.join(there) or 'none'}"
+            f"{owner}: no column of positions is called {' or '.join(wanted)}; rename the column, or specify it. "
+            f"Position columns: {', '.join(there) or 'none'}"
         )
     others = {a: n for a in "XYZ" if a != axis for n in (f"{a.lower()}_mm", f"{a}_mm") if n in there}
     return {axis: found[0], **others}

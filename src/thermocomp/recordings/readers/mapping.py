@@ -301,7 +301,7 @@ def _unknown_key(table: str, key: str, inside: type) -> str:
     known = [f.name for f in fields(inside)]
     near = get_close_matches(key, known, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"{table}: unknown key {key!r}; {hint}Known are {', '.join(known)}"
+    return f"{table}: unknown key {key!r}; {hint}known keys: {', '.join(known)}"
 
 
 def _unit_in(table: str, symbol: str, quantity: str | None) -> None:
@@ -329,8 +329,8 @@ def _check_zone(name: str) -> None:
             ZoneInfo(name)
     except (ZoneInfoNotFoundError, ValueError, OSError) as e:
         raise InputError(
-            f"[time]: zone = {name!r} is not known; write a place of the time zone database, such as "
-            '"Europe/Berlin" or "America/Detroit", or "UTC"'
+            f'[time]: zone = {name!r} is not known; write a name from the time zone database, such as "Europe/Berlin" '
+            'or "America/Detroit", or "UTC"'
         ) from e
 
 

@@ -162,7 +162,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
         for shown, options in guess_columns(table, mapping):
-            dialogue.ask(Question(f"column {shown} has no unit that is known", tuple(options), "column"))
+            dialogue.ask(Question(f"column {shown} has no known unit", tuple(options), "column"))
     recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
     for _ in range(_ROUNDS):
         before, mapping = dialogue.draft.text, dialogue.draft.mapping(owner)
@@ -289,13 +289,13 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
     dialogue, name = _Dialogue(Draft(begun), take_best, path), _file_name(path)
     try:
         dialogue.until(lambda: read(path, dialogue.draft.mapping(str(path))))
-        how = "by this mapping it is read; look it over"
+        how = "this mapping reads it; check it"
     except InputError as e:
         if not dialogue.decided or any(map(_skips, e.remedies[:1])):
             return ""
         if isinstance(e, TwoReadingsError):
             return _offer_choice(dialogue.draft.text, e.remedies, name)
-        how = f"this mapping goes part of the way ({str(e).removeprefix(f'{path}: ')}); complete it"
+        how = f"this mapping resolves part of the problem ({str(e).removeprefix(f'{path}: ')}); complete it"
     other = "".join(f"\n# or: {way}" for q, _ in dialogue.decided for way in q.others)
     return f"{how}, save it as {name} and give it with --mapping {name}:\n\n{dialogue.draft.text.strip()}{other}"
 

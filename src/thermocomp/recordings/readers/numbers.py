@@ -82,8 +82,8 @@ class Signs:
                 sign = "." if "." in cell else ","
                 whole, part = cell.replace(sign, ""), cell.replace(sign, ".")
                 raise RecordingError(
-                    f"{cell!r} can be read as {whole} or as {part}, and no other number tells which; state the "
-                    'decimal sign in a mapping: [read] decimal = "," or decimal = "."',
+                    f"{cell!r} can be read as {whole} or as {part}, and no other number shows which; state the decimal "
+                    'sign in a mapping: [read] decimal = "," or decimal = "."',
                     [{"read": {"decimal": mark}} for mark in (sign, {".": ",", ",": "."}[sign])],
                 )
             decimal = "."

@@ -91,7 +91,7 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     elif called:
         found = [(recording.channel(name), {axis: p}) for name, p in called.items()]
         if elsewhere:
-            why = "another axis stood elsewhere, where turns have a lever: take that off, and read a long table"
+            why = "at another position, angular errors have a lever arm: subtract their effect, and read a long table"
             notes += (f"{NOT_TAKEN} {elsewhere[0]} to {elsewhere[-1]}: {why}",)
     else:
         found = [(c, {axis: p}) for c, p in _by_name(recording, QUANTITY[unit], owner)]
@@ -99,8 +99,8 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     if not found:
         what = f"called {wanted.columns!r}" if wanted.columns else f"like y_laser_250_{unit} (position in mm, unit)"
         raise RecordingError(
-            f"{owner}: no column is {what}; state which columns hold the profile, such as 'y_laser_*', or read a table "
-            "with a row per position as a long one. There are "
+            f"{owner}: no column is {what}; state which columns hold the profile, such as 'y_laser_*', or use layout "
+            "'long' for a table with a row per position. The columns are "
             + ", ".join(c.name for c in recording.channels if c.quantity in QUANTITY.values())
         )
     mixed = [c for c, _ in found if c.quantity != QUANTITY[unit]]

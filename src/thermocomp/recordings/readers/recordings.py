@@ -178,7 +178,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     """
     target = Path(path)
     if target.suffix not in (".csv", ".parquet"):
-        raise InputError(f"{target}: a recording is written as .csv or .parquet")
+        raise InputError(f"{target}: a recording can only be written as .csv or .parquet; change the file extension")
     as_text = target.suffix == ".csv"
     described: dict[str, ColumnMap] = {}
     headings = {}
@@ -274,7 +274,9 @@ def _labels(file: FileCells) -> list[Any] | None:
         return None
     labels = file.cells[cycle]
     for row in np.flatnonzero(labels.isna())[:1]:
-        raise file.refuse_row(int(row), "the cycle's label is missing; every row belongs to a cycle", cycle)
+        raise file.refuse_row(
+            int(row), "the label of the thermal cycle is missing; fill it in, since every row belongs to a cycle", cycle
+        )
     return [restore(label) if isinstance(label, str) else label for label in labels.tolist()]
 
 

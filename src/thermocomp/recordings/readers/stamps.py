@@ -95,7 +95,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     notes: tuple[str, ...] = ()
     if stated in orders:
         if len(orders) > 1:
-            orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading says",)
+            orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading specifies",)
         _refuse_other_order(plain, shape, stated, parse(plain, _format(shape, stated)))
     read = {"dmy": parse(plain, _format(shape, "dmy"))} if _has_points(shape) and "dmy" in orders else {}
     if not any(_is_one_stretch(stamps) for stamps in read.values()):
@@ -113,7 +113,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
             notes = (f"the dates are {_WORDS[choice.order]}: {choice.why}",)
         whole = [choice.order]
     elif whole and len(orders) > 1 and not (_has_points(shape) and whole == ["dmy"]):
-        notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is none otherwise",)
+        notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is not a date otherwise",)
     best = whole[0] if whole else max(orders, key=lambda o: int(read[o].notna().sum()))
     if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
         notes += (f"{shape['zone']} is taken as UTC{_ZONES[shape['zone']]}",)

@@ -292,7 +292,7 @@ def _refuse_mixed(table: FileTable, column: int, cells: "pd.Series[Any]", groupe
         if isinstance(cell, str) and _UNGROUPED.match(cell.strip()):
             raise RecordingError(
                 f"{table.path}: column {table.headings[column]!r}: {table.place(grouped)} has {cells.iloc[grouped]!r} "
-                f"with a separator of thousands, {table.place(row)} has {cell!r} without; write both in one way"
+                f"with a thousands separator, {table.place(row)} has {cell!r} without; write both in one way"
             )
 
 

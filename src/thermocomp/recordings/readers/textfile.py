@@ -128,8 +128,8 @@ class CsvTable(FileTable):
             raise ValueError("it contains no rows") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
-                f"{self.path}: is not written in {self.encoding} ({e.reason}); give the right one in a mapping, "
-                "[read] encoding"
+                f"{self.path}: is not written in {self.encoding} ({e.reason}); specify the correct encoding in a "
+                "mapping, [read] encoding"
             ) from e
         if len(frame) != self.n_rows:
             raise RecordingError(

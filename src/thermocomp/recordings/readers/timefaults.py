@@ -12,8 +12,8 @@ from thermocomp.recordings.readers.tables import skip_row
 
 _DAY = 86_400.0
 _ZONE = (
-    'use UTC or timestamps with an offset, or name the zone in a mapping, [time] zone = "Europe/Berlin" ("UTC": a '
-    "clock that is never set)"
+    'use UTC or timestamps with an offset, or name the zone in a mapping, [time] zone = "Europe/Berlin" ("UTC" for a '
+    "clock without daylight saving)"
 )
 
 
@@ -37,18 +37,18 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     recorded = bool(abs(steps[row - 1] - np.median(steps) + 3600) < 300)
     if local and (recorded or _may_be_set_back(start, time, row)):
         when = "" if recorded else " while nothing was recorded"
-        raise RecordingError(f"{text}, perhaps as the clock was set back (daylight saving){when}: {_ZONE}")
+        raise RecordingError(f"{text}, perhaps because the clock was set back (daylight saving){when}: {_ZONE}")
     never_again = steps[row - 1] < 0 and time[row:].max() < time[row - 1]
     if is_stamp and steps[row - 1] < 0 and abs(steps[row - 1] + 43_200) <= max(600, 2 * float(np.median(steps))):
         raise TwoReadingsError(
-            f"{text}: perhaps a clock of twelve hours whose AM and PM are not in the file, or not found; write them "
-            "behind the times or into a column headed AM/PM, or write times of 24 hours",
+            f"{text}: perhaps a 12-hour clock whose AM and PM are missing in the file, or not recognised; append them "
+            "to the times, put them in a column headed AM/PM, or use 24-hour times",
             [skip_row(table, row)],
         )
     if is_stamp and not start and never_again:
         raise TwoReadingsError(
-            f"{text}, and no later row reaches it: the next day, or a clock of twelve hours without AM and PM, "
-            "or one that was set? Write dates beside the times, or split the file into tests",
+            f"{text}, and no later row reaches it: the next day, a 12-hour clock without AM and PM, or a clock that "
+            "was reset? Add dates to the times, or split the file into tests",
             [skip_row(table, row)],
         )
     raise RecordingError(
@@ -83,10 +83,10 @@ def refuse_passed(time: FloatArray, start: str, file: FileCells) -> None:
     if rows.size and (begin - begin.normalize()).total_seconds() <= usual:
         heading, name = file.heading, file.table.headings[file.times.date]
         raise TwoReadingsError(
-            f"{file.source}: {file.table.place(int(rows[0]))}: {name!r} changes, and {heading!r}, which begins with "
-            f"zero, runs on by {more[rows[0] - 1]:g} s: time that passed, or a pause of a whole day? If it is time "
-            f'that passed, leave out {name!r} in a mapping: [time] column = "{heading}" and [columns."{name}"] role = '
-            '"ignore"; if not, state how both are written: [time] column, date and format',
+            f"{file.source}: {file.table.place(int(rows[0]))}: {name!r} changes, but {heading!r}, which starts at "
+            f"zero, increases by only {more[rows[0] - 1]:g} s: is it an elapsed time, or was there a pause of a whole "
+            f'day? If it is an elapsed time, leave out {name!r} in a mapping: [time] column = "{heading}" and '
+            f'[columns."{name}"] role = "ignore"; if not, state how both are written: [time] column, date and format',
             [{"time": {"column": heading}, "columns": {name: {"role": "ignore"}}}],
         )
 
@@ -108,8 +108,7 @@ def refuse_set_forward(time: FloatArray, start: str, file: FileCells) -> None:
         spring = after.month in (3, 4, 9, 10, 11) and after.weekday() in (4, 5, 6) and before.hour <= 3
         if spring and after.hour == before.hour + (1 if after.minute >= before.minute else 2):
             raise TwoReadingsError(
-                f"{file.at(int(row))}: an hour is missing between {before} and "
-                f"{after}, perhaps as the clock was set forward (daylight saving), perhaps as nothing was recorded: "
-                f"{_ZONE}",
+                f"{file.at(int(row))}: an hour is missing between {before} and {after}, perhaps because the clock was "
+                f"set forward (daylight saving), perhaps because nothing was recorded: {_ZONE}",
                 [{"time": {"zone": "UTC"}}],
             )

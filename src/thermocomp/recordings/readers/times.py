@@ -40,7 +40,7 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
             raise RecordingError(
                 f"{source}: columns {times.time + 1} and {k + 1} are both named {file.heading!r} and hold different "
                 f"times, such as {shown.iloc[row]} and {other.iloc[row]} in {table.place(int(row))}; channels that "
-                "were sampled at different times do not make one recording: resample them to one time"
+                "were sampled at different times cannot form one recording: resample them to common times"
             )
     notes: tuple[str, ...] = ()
     if beside:
@@ -98,7 +98,7 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
             differ = e.differ()
             raise (TwoReadingsError if differ else RecordingError)(
                 f"{file.source}: {file.table.place(0)}, column {titled!r}: {first!r} can be read as {e}, and no row "
-                f"tells which{f' ({e.tell()})' if differ else ''}; state how it is written in a mapping: [time] "
+                f"shows which{f' ({e.tell()})' if differ else ''}; state how it is written in a mapping: [time] "
                 f"{_told(keys)} and {ways}",
                 [{"time": {**keys, "format": form}} for form in e.readings],
             ) from e
@@ -178,7 +178,7 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
         return (whole - whole[0]) / 1e9, "", ()
     places = tell_places((np.flatnonzero(midnights) + 1).tolist(), file.table.place)
     days_on = np.concatenate([[0], np.cumsum(midnights)])
-    return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day goes over midnight in {places}",)
+    return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day passes midnight in {places}",)
 
 
 def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
@@ -235,7 +235,9 @@ def _in_zone(time: FloatArray, start: str, zone: str, where: str) -> tuple[Float
     try:
         zoned = local.tz_localize(zone, ambiguous="infer")
     except ValueError as e:  # an hour that does not exist in the zone, or occurs twice and is ambiguous
-        raise RecordingError(f"{where}: these are not times in {zone}: {e}; correct [time] zone in the mapping") from e
+        raise RecordingError(
+            f"{where}: these cannot be times in {zone}: {e}; correct [time] zone in the mapping"
+        ) from e
     return _seconds(pd.Series(zoned - zoned[0])), zoned[0].isoformat()
 
 

@@ -8,10 +8,10 @@ from typing import Any
 from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.recurrences import Clock
 from thermocomp.runtime.program.clocks import run_clock
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
-from thermocomp.core.recurrences import Clock
 from thermocomp.runtime.program.supporting import Supports
 from thermocomp.runtime.program.tree import Expression, Function, Name
 from thermocomp.runtime.program.values import Number, Truth, Whole, integer, real

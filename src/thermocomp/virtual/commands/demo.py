@@ -41,8 +41,8 @@ def demo(
         console.print("[bold]1. The virtual machine tool runs a drift test[/]")
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
     if not json:
-        console.print("\n[bold]2. Five methods, judged on thermal cycles they have not seen[/]")
+        console.print("\n[bold]2. Five methods, judged on unseen thermal cycles[/]")
     compare([recording], output=report, overwrite=overwrite, json=json)
     if not json:
-        console.print("\n[bold]3. 'averaged', fitted to everything and frozen[/]")
+        console.print("\n[bold]3. 'averaged', fitted to all cycles and frozen[/]")
     return fit([recording], output=model, overwrite=overwrite, quiet=json)

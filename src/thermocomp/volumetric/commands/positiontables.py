@@ -61,7 +61,7 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
     if fit.profile.words:
         console.print(f"[yellow]but[/] it {words(fit.profile.words)}")
     if left_open:
-        console.print(f"Chosen by the profiles: {words(_chosen(found, left_open))}")
+        console.print(f"Determined from the profiles: {words(_chosen(found, left_open))}")
     for factor, errors, power in zip(model.models, fit.coefficient_errors, model.powers, strict=True):
         formula = factor.formula()
         console.print(words(f"k{power} [{factor.unit}] = {_shortened(formula)}"))
@@ -69,13 +69,15 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
             told = ", ".join(f"{name} {error:.2g}" for name, error in errors.items())
             console.print(words(f"  standard errors: {told}"))
     rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
-    console.print(f"Beside the cold profile {fit.thermal_rms:.2f} {unit} RMS; beside powers up to {words(rest)} {unit}")
+    console.print(
+        f"Residual of the cold profile {fit.thermal_rms:.2f} {unit} RMS; with powers up to {words(rest)} {unit}"
+    )
     if model.powers and "slopes" not in left_open and fit.enough > max(model.powers):
         console.print(f"[yellow]but[/] higher powers describe more: try --slopes {fit.enough}")
     if model.slopes and "offset" not in left_open and fit.shifts:
         console.print(
             f"[yellow]but[/] the profiles do not turn about {model.reference_position:g} mm: with an offset "
-            f"{fit.offset_remainder:.2f} {unit} are left; try --offset, or another --reference-position"
+            f"{fit.offset_remainder:.2f} {unit} remain; try --offset, or another --reference-position"
         )
     _show_judging(found, left_open, console)
     print_table(_cycle_table(found), console)
@@ -97,7 +99,7 @@ def show_all(
     caption = (
         "order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
         "RMS over all points of unseen profiles, um or urad: without compensation, less the cold profile, less the "
-        "model; profile: the cold profile alone is taken"
+        "model; profile: the cold profile alone is used"
     )
     columns = (
         Column("", lambda f: f"{f.fit.model.target}, {f.fit.model.unit}", whole=True),

@@ -102,7 +102,7 @@ class JudgedSplit:
 
 
 def judge_split(tests: Sequence[Profiles], fit: PositionFit, options: PositionOptions, split: Split) -> JudgedSplit:
-    """Return the errors in the judged rows of a split, except those of cold profiles that are zeros."""
+    """Return the errors in the judged rows of a split, except those of cold profiles that serve as zero."""
     samples, model = fit.samples, fit.model
     rows = split.judge.copy()
     for k, test in enumerate(tests):

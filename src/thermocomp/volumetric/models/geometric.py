@@ -1,4 +1,4 @@
-"""Geometric part f_g of an error: a polynomial or a spline; its order is chosen by leaving points out (C-04, C-06)."""
+"""Geometric part f_g of an error: a polynomial or a spline; its order is chosen by cross-validation (C-04, C-06)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -114,7 +114,7 @@ def fit_profile(
     not left out: a profile is never used beyond them, and extrapolation there would dominate the choice. Only with
     fewer than three positions between them, too few to judge by, are the ends left out too.
 
-    If points are repeated, the noise is known: orders that leave clearly more are not used (`LEVEL`).
+    If points are repeated, the noise is known: orders whose residual clearly exceeds it are not used (`LEVEL`).
 
     With 5 to 8 positions there may be no order that follows the profile. Along one coordinate a natural spline through
     the means of all positions therefore competes, from 4 positions on. It is used if no order fits, or if it predicts

@@ -85,7 +85,7 @@ def fill_options(
     """Determine open options from the profiles; temperatures are not used.
 
     - Reference position: the measured position where the thermal part is smallest, i.e. where powers that vanish there
-      leave least. A laser reads relative to its zeroing position, a screw grows from its fixed bearing.
+      leave the smallest residual. A laser reads relative to its zeroing position, a screw grows from its fixed bearing.
     - Offset: used if the thermal part exceeds the noise even there: it must remove a tenth of the powers' remainder.
     - Slopes: the fewest powers to which one more adds little, as in `PositionFit.enough`; none if the thermal part is
       noise.
@@ -125,7 +125,7 @@ def reference_position(tests: Sequence[Profiles], options: PositionOptions) -> f
 def set_cold_profiles(
     tests: Sequence[Profiles], options: PositionOptions, learn: BoolArray | None = None
 ) -> tuple[Profiles, ...]:
-    """Return the tests with their cold profiles: its own for each, or the mean for all (`PositionOptions.rezero`).
+    """Return the tests, each with its own cold profile, or all with the mean of these (`PositionOptions.rezero`).
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def choose_power(remainders: Mapping[int, float], thermal: float) -> int | None:
 
 
 def _quietest(tests: Sequence[Profiles], options: PositionOptions, m: int) -> float:
-    """Return the measured position relative to which powers up to m leave least [mm]."""
+    """Return the measured position relative to which powers up to m leave the smallest residual [mm]."""
     alone = replace(options, offset=False)
     places = np.unique(np.concatenate([test.position for test in tests])).tolist()
     return float(min(places, key=lambda p: remainder(tests, replace(alone, reference_position=p), m)))

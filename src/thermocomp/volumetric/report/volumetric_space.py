@@ -232,7 +232,7 @@ def _lines(study: Volumetric) -> list[tuple[FloatArray, bool]]:
 
 
 def _bare(ax: Axes, room: FloatArray) -> None:
-    """Remove axes and frame, and give all panels the same size: room for points (n, 2) on the paper."""
+    """Remove axes and frame, and give all panels the same limits, which contain the given points (n, 2)."""
     low, high = room.min(axis=0), room.max(axis=0)
     beside = 0.1 * (high - low)
     ax.set_xlim(low[0] - beside[0], high[0] + beside[0])

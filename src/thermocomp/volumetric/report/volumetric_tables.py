@@ -26,7 +26,7 @@ def headline(study: Volumetric) -> str:
     return (
         f"Largest error in the work volume {none.largest:.1f} um, RMS {none.rms:.1f} um, {when}; after the best "
         f"straight line of each axis {lines.largest:.1f} um, RMS {lines.rms:.1f} um; after a correction "
-        f"that is another one at every point {left} um"
+        f"computed for every point {left} um"
     )
 
 
@@ -105,8 +105,8 @@ def lines(study: Volumetric, *, page: bool = False) -> Layout:
     if page:
         columns += [
             Column("reference position", "reference_position_mm", "um", "mm"),
-            Column("left along it, largest", "left_along_max_um", "um", "um"),
-            Column("left in the volume, RMS", "left_volume_rms_um", "um", "um"),
+            Column("residual along it, largest", "left_along_max_um", "um", "um"),
+            Column("residual in the volume, RMS", "left_volume_rms_um", "um", "um"),
             Column("largest", "left_volume_max_um", "um", "um"),
         ]
     else:

@@ -152,7 +152,7 @@ class Server:
         return "in joint mode" if self.pins["enabled"] else "off"
 
     def report(self, beat: int) -> dict[str, Any]:
-        """Return the report of the correction in force for a message."""
+        """Return the report of the correction in force, in answer to a message."""
         now = time.monotonic()
         why, limited = self.why(), self.pins["limited"]
         micron = 1e-3 * self.unit
@@ -182,7 +182,7 @@ class Server:
     # -- the service ---------------------------------------------------------------------------------------------------
 
     def accept(self) -> None:
-        """Accept a connection of the service; if another service is connected, reply so and close."""
+        """Accept a connection of the service; if another service is connected, report this and close."""
         connection, _ = self.listener.accept()
         if self.client is not None and self.left():
             self.drop()
@@ -198,7 +198,7 @@ class Server:
         self.since = time.monotonic()
 
     def left(self) -> bool:
-        """Return whether the connected service has hung up; checked only when another one connects."""
+        """Return whether the connected service has disconnected; checked only when another one connects."""
         assert self.client is not None
         try:
             return self.client.recv(1, socket.MSG_PEEK) == b""
@@ -334,15 +334,15 @@ def keep(arguments: list[str]) -> None:
 
 def main() -> None:
     """Run the component."""
-    parser = argparse.ArgumentParser(description="The end of thermocomp inside LinuxCNC.")
+    parser = argparse.ArgumentParser(description="The thermocomp component inside LinuxCNC.")
     parser.add_argument("--pattern", choices=("offset", "drive"), required=True)
     parser.add_argument("--axis", action="append", required=True, help="letter,low,high: z,-200,100 [units of the INI]")
     parser.add_argument("--socket", required=True)
-    parser.add_argument("--group", default="", help="whose members may connect")
+    parser.add_argument("--group", default="", help="user group whose members may connect")
     parser.add_argument("--unit", choices=("mm", "inch"), default="mm")
     for name, unit in (("magnitude", "um"), ("rate", "um/s"), ("timeout", "s"), ("hold", "s"), ("fade", "um/s")):
         parser.add_argument(f"--{name}", type=float, required=True, help=unit)
-    parser.add_argument("--once", action="store_true", help="do not start it again when it is killed")
+    parser.add_argument("--once", action="store_true", help="do not restart the component if it is killed")
     options = parser.parse_args()
     if not options.once:
         keep(sys.argv[1:])

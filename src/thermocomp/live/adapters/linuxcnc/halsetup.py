@@ -41,7 +41,7 @@ class HalSettings:
     fade : float
         Rate at which the correction ramps to zero after the hold time [um/s].
     group : str
-        User group whose members may connect; without one only the user that runs LinuxCNC may.
+        User group whose members may connect; without one, only the user that runs LinuxCNC may connect.
     """
 
     pattern: Pattern = "offset"
@@ -128,7 +128,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
 
 
 def set_up(path: Path, folder: Path, settings: HalSettings, *, overwrite: bool = False) -> HalSetup:
-    """Write the files that correct a machine: a HAL file and the component that it starts."""
+    """Write the files for correcting a machine: a HAL file and the component that it starts."""
     prepared = prepare(path, folder, settings)
     with drafts(prepared.files, overwrite=overwrite) as started:
         for draft, text in zip(started.values(), (prepared.component, prepared.hal), strict=True):

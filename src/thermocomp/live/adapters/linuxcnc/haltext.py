@@ -136,8 +136,8 @@ def make_line(axis: HalAxis, files: HalFiles, magnitude: float, micron: float) -
 def make_offset(axis: HalAxis, files: HalFiles, micron: float) -> list[str]:
     """Return the HAL lines that keep an external offset at its target.
 
-    Only changes of the counts accumulate, and some are lost: the difference from the controller's own request is
-    therefore added. While no correction can be in force the line starts from that request, so the difference is zero.
+    LinuxCNC adds up the changes of the counts, and some are lost: the difference from the controller's own request is
+    therefore added. While no correction can be in force, the line starts from that request: the difference is zero.
     """
     a, scale = axis.letter, RESOLUTION * 1e3 * micron
     request = f"axis.{a}.eoffset-request"

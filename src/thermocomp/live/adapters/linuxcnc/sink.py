@@ -1,4 +1,4 @@
-"""Corrections to a LinuxCNC: client of the HAL component installed by ``thermocomp linuxcnc setup``."""
+"""Corrections for LinuxCNC: client of the HAL component installed by ``thermocomp linuxcnc setup``."""
 
 import asyncio
 import contextlib
@@ -34,7 +34,7 @@ class AxisReport(NamedTuple):
 
 @dataclass(kw_only=True)
 class LinuxCncSink:
-    """Corrections to a LinuxCNC on this computer.
+    """Corrections for LinuxCNC on this computer.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ class LinuxCncSink:
         if missing := {a.upper() for a in self.axes.values()} - self._reports.keys():
             await self._hang_up()
             raise self._fail(
-                f"axis {', '.join(sorted(missing))} is not corrected there; run 'thermocomp linuxcnc setup' again with "
-                "--axes"
+                f"LinuxCNC does not correct axis {', '.join(sorted(missing))}; run 'thermocomp linuxcnc setup' again "
+                "with --axes"
             )
         self._connection.to("connected")
         self._beating = asyncio.create_task(self._live())

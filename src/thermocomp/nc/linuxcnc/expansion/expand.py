@@ -91,7 +91,7 @@ def expand(
     user_codes: bool = False,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Expansion:
-    """Write a program as plain lines that do the same on every machine, whatever its origins and tool lengths.
+    """Write a program as plain lines with the same effect on every machine, whatever its origins and tool lengths.
 
     LinuxCNC's interpreter runs the program in two controllers with different origins, tool lengths, homes, parameters,
     tools in the spindle and start positions, and the result contains what both runs have in common. Then program and

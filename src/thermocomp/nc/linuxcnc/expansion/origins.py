@@ -106,7 +106,7 @@ class OriginWriter:
         self.line = 0  #: last line of the program with any effect
 
     def refuse(self, reason: str, file: str = "") -> ProgramError:
-        """Return an error for the line being run; within a subprogram in another file, for the last line before it."""
+        """Return an error for the line being run; in a subprogram in another file, for the last line of the program."""
         return ProgramError(max(self.line, 1), f"it cannot be expanded: {reason}" + (f" (in {file})" if file else ""))
 
     def chosen_system(
@@ -155,7 +155,7 @@ class OriginWriter:
         return result
 
     def plain_g10(self, source: str) -> str:
-        """Return the line that sets the origin of a system not in force: only the source line specifies which."""
+        """Return the line that sets the origin of a system not in force: only the source line states which system."""
         text = _bare(source)
         if not PLAIN_G10.fullmatch(text):
             raise self.refuse(
@@ -195,7 +195,7 @@ class OriginWriter:
         return f"G92 {' '.join(named)}" if named else f"G52 {' '.join(fixed)}" if fixed else ""
 
     def tool_length(self) -> str:
-        """Return the line that puts the tool length of both sides into force."""
+        """Return the line that activates the tool length of both sides."""
         first, second = (side.frame.length for side in self.sides)
         if not (any(first) or any(second)):
             return "G49"

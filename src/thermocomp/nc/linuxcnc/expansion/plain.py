@@ -76,7 +76,7 @@ class Writer(OriginWriter):
             self.line = line if first.file or second.file else min(line, second.line)
             raise self.refuse(
                 f"the path of execution {DEPENDS}: a branch or a loop uses a parameter, an origin or a position that "
-                "the program has not set; set it before",
+                "the program has not set; set it first",
                 first.file,
             )
         merged = False
@@ -197,7 +197,7 @@ class Writer(OriginWriter):
         elif kind in PLAIN:
             yield kind, PLAIN[kind].format(*map(format_number, values))
         elif kind not in {"rotation", "naive"}:
-            raise self.refuse(f"{kind} is unknown", call.file)
+            raise self.refuse(f"'{kind}' has no equivalent in plain codes", call.file)
 
     # --- moves ---
     def move(self, a: Canonical, b: Canonical) -> Iterator[str]:
@@ -280,7 +280,7 @@ class Writer(OriginWriter):
                 return
         raise self.refuse(
             f"the end position in {', '.join(AXES[i] for i in moved)} {DEPENDS} (origins, tools, parameters, G98 or "
-            "G99, its position at the start): let the program set it before"
+            "G99, its position at the start): set it in the program first"
         )
 
     def arc(self, a: Canonical, b: Canonical, known: list[bool]) -> Iterator[str]:

@@ -132,7 +132,9 @@ class Side:
         for told in np.flatnonzero(kind == self.run.codes["file"]).tolist():
             if file := block.more[int(values[told, 0])]:
                 line = int(raw[max(told - 1, 0)])
-                raise Unprovable(f"line {line}: it calls {file.rsplit('/')[-1]}, another file; --expand writes it out")
+                raise Unprovable(
+                    f"line {line}: the program calls another file, {file.rsplit('/')[-1]}; --expand inserts its lines"
+                )
         plane, turns = self._turned(kind, values)
         end, moving = self._ends(block, kind, values)
         last = np.maximum.accumulate(np.where(moving, np.arange(len(kind)), -1))

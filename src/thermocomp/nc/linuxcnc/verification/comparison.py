@@ -71,7 +71,7 @@ def compare(
             for _ in was:  # a refusal of the original takes precedence
                 pass
             line = int(origin.second(np.array([e.line]))[0])
-            raise ProgramError(line, f"it does not run the revised program: {e.reason}") from e
+            raise ProgramError(line, f"the revised program does not run: {e.reason}") from e
         if a is None or b is None:
             break
         count = min(len(a), len(b.calls))
@@ -81,7 +81,7 @@ def compare(
         b = b.part(count, len(b.calls)) if len(b.calls) > count else None
     if (rest := a or (b and b.calls)) is not None:
         side, whose = (sides[0], "original") if a is not None else (sides[1], "revised program")
-        raise ProgramError(int(rest.line[0]), f"a '{side.name(rest.kind[0])}' is in the {whose} only")
+        raise ProgramError(int(rest.line[0]), f"only the {whose} contains this '{side.name(rest.kind[0])}'")
     return Found(comparison.moves, comparison.largest, comparison.slower * 100.0)
 
 

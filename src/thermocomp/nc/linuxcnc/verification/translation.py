@@ -144,7 +144,7 @@ class Translator:
             raise _cannot(block, "G31 probes: its end position is unknown")
         self._stores |= codes & {"G52", "G68", "G92", "G92.1"}
         if self._stores & {"G92", "G92.1"} and self._stores & {"G52", "G68"}:
-            raise _cannot(block, "G92 with G52 or G68: LinuxCNC has one store for them")
+            raise _cannot(block, "G92 with G52 or G68: LinuxCNC has one stored offset for all of them")
 
     def _cutter(self, block: Block, codes: set[str]) -> list[str]:
         side = next((code for code in ("G41", "G42") if code in codes), None)
@@ -168,7 +168,7 @@ class Translator:
         return [system_name(self._spare(block, block.modal.system))]
 
     def _spare(self, block: Block, system: int) -> int:
-        """Return the LinuxCNC system that stands for a system of G54.1."""
+        """Return the LinuxCNC system that replaces a system of G54.1."""
         if system not in self.systems:
             if len(self.systems) == len(_SPARE):
                 raise _cannot(block, f"LinuxCNC can hold up to {len(_SPARE)} work coordinate systems of G54.1")
@@ -192,7 +192,7 @@ class Translator:
         if once == "G10":
             return self._stored(block)
         if once == "G30" and values.get("P", 2.0) != 2.0:
-            raise _cannot(block, f"G30 P{values['P']:g}: LinuxCNC has two reference points")
+            raise _cannot(block, f"G30 P{values['P']:g}: LinuxCNC has only two reference points")
         if once == "G52":
             scale = self._follower.state.scale
             self._local = triple(

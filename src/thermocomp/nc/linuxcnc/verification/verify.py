@@ -1,6 +1,6 @@
 """Verification of a revised program by LinuxCNC's interpreter: its moves are those of the original plus the shifts.
 
-It is run in eight controller states: given settings are the same in all of them, all others are random.
+Both programs are run in eight controller states: given settings are the same in all of them, all others are random.
 """
 
 from array import array
@@ -77,7 +77,7 @@ class _Proving(NamedTuple):
         return False
 
     def causes(self, number: int, drawn: set[str]) -> list[str]:
-        """Return the random settings that cause the failure: each on its own, or those needed for it.
+        """Return the random settings that cause the failure: each that does so alone, else all that contribute to it.
 
         The list is empty if the comparison also fails without random settings.
         """
@@ -147,7 +147,7 @@ def foresee_sentence(setup: Setup) -> str:
 def _say_states(count: int, held: Sequence[str], drawn: Sequence[str]) -> str:
     named = (f"{name} (in half of them)" if name in states.HALF else name for name in drawn)
     return (
-        f"in {count} controller states; the same in all: {', '.join(('what the program says', *held))}; "
+        f"in {count} controller states; the same in all: {', '.join(('what the program specifies', *held))}; "
         f"not the same: {', '.join(named)}"
     )
 
@@ -221,8 +221,8 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
         remedies = f"a correction of X or Y turns with the rotation of its work coordinate system; {remedies}"
     return ProgramError(
         error.line,
-        f"{what}, in a controller where {names} {'is' if len(causes) == 1 else 'are'} another: that is not "
-        f"stated, so it cannot be proved; {remedies}",
+        f"{what}, in a controller with other values of {names}: not stated, so the program cannot be proved; "
+        f"{remedies}",
     )
 
 
