@@ -104,9 +104,12 @@ def test_only_paced_models_have_parts_and_a_step_is_positive() -> None:
         time_constants=(),
         lagged=(),
     )
-    for asked in (lambda: contributions(other, table()), lambda: gains(other, 60.0)):
-        with pytest.raises(InputError, match=r"z_um has a model of the family linear-dynamic.* averaged produces"):
-            asked()
+    with pytest.raises(InputError, match=r"z_um has a model of the family linear-dynamic.* averaged produces"):
+        gains(other, 60.0)
+    known = contributions(other, table())
+    assert not any(part.any() for name, part in known.items() if name != MODEL.inputs[0].name)
+    with pytest.raises(InputError, match="a term depends on several inputs"):
+        contributions(replace(other, signals=((0, 1),)), table())
     for step in (0.0, -5.0, np.nan):
         with pytest.raises(InputError, match=f"^step {step}: the time between two rows must be"):
             gains(MODEL, step)

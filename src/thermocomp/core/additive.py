@@ -2,11 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Literal
 
-import numpy as np
-
-from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import NODES, check_count, check_finite
 from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import SettingError
@@ -35,7 +32,6 @@ class Additive(ErrorModel):
     """
 
     family: Literal["additive"] = "additive"
-    remembers: ClassVar[bool] = False
 
     variables: tuple[Variable, ...]
     curves: tuple[Curve, ...]
@@ -49,22 +45,6 @@ class Additive(ErrorModel):
         check_finite(owner, intercept=self.intercept)
         for v in self.variables:
             v.check_inputs(len(self.inputs))
-
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return np.empty((*change.shape[:-1], 0))
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
-        # Sum term by term: a matrix product rounds a single reading differently from a batch.
-        total = np.zeros(change.shape[:-1])
-        for v, curve in zip(self.variables, self.curves, strict=True):
-            (first, weight), *others = v.weights
-            value = change[..., first] if weight == 1.0 else weight * change[..., first]
-            for i, w in others:
-                value = value + w * change[..., i]
-            total = total + curve(value)
-        if self.response is not None:
-            total = self.response(total)
-        return memory, total + self.intercept
 
     def _expression(self, change: Sequence[Node]) -> Node:
         curves = zip(self.variables, self.curves, strict=True)

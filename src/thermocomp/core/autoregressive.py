@@ -1,27 +1,15 @@
 """Autoregressive families: the deviation from its own past and from inputs, in steps of a fixed interval (P-01).
 
-The model's clock ticks every `interval`; readings may come at any time:
-
-- A reading represents the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input of
-  a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is the
-  reading itself.
-- Ticks are computed when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
-  equal, the rest of a gap is one matrix power (for a net, the loop ends once its output has settled).
-- Between two ticks the deviation is interpolated linearly from the last tick towards the next one, which is computed
-  with the mean of the inputs since the last tick. The deviation is continuous in time, so that a reading at 14.9 s
-  instead of 15.1 s makes no significant difference; at the tick it is exact.
-
 The past deviations are those of the model, never measured ones (P-05, E-P3). `ErrorModel.init` starts cold: zero
 deviation and zero inputs before the first reading. The effect of an earlier job (E-P5) is carried over either by
 continuing with its `State`, or by `begin_at`.
 """
 
-import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,26 +21,16 @@ from thermocomp.core.expression import Constant, Mean, Named, Node, Past, Recurr
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Affine, Perceptron
 from thermocomp.core.state import State
+from thermocomp.core.ticker import companion
 
-#: fraction of the interval by which a reading may come early and still trigger the tick; covers rounding of clocks
-EARLY = 1e-6
 #: smallest admissible 1 - sum(a); the settled deviation is the drive divided by it
 SETTLES = 1e-9
-#: maximum number of ticks of a net made at once: one day at 15 s; after that the net is assumed to have settled
-MOST_TICKS = 5760
 
 
 def find_largest_root(a: ArrayLike) -> float:
     """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run is stable."""
     roots = np.linalg.eigvals(companion(np.asarray(a, dtype=np.float64)))
     return float(np.abs(roots).max(initial=0.0))
-
-
-def companion(a: FloatArray) -> FloatArray:
-    """Return the matrix that advances the last k deviations by one tick, without inputs."""
-    matrix = np.eye(len(a), k=-1)
-    matrix[:1] = a
-    return matrix
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,22 +45,12 @@ class Ticking(ErrorModel):
         h, time between two ticks [s].
     """
 
-    remembers: ClassVar[bool] = True
-
     interval: float
 
     @property
     @abstractmethod
     def orders(self) -> tuple[int, int]:
         """Number of past deviations (k) and past values of each input (m) used in one tick."""
-
-    @abstractmethod
-    def _tick(self, regressors: FloatArray) -> FloatArray:
-        """Return the next deviation from [dz(t-h) .. dz(t-kh), inputs(t), inputs(t-h) .. inputs(t-mh)]."""
-
-    @abstractmethod
-    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
-        """Return the last deviations after `ticks` more ticks at constant inputs `driven`."""
 
     def begin_at(
         self, deviation: ArrayLike, inputs: ArrayLike | None = None, reference: ArrayLike | None = None
@@ -112,74 +80,13 @@ class Ticking(ErrorModel):
                 "infinity"
             )
         change, _ = self.clip(given - zero)
-        k, m = self.orders
         shape = np.broadcast_shapes(known.shape, change.shape[:-1])
-        own = np.broadcast_to(known[..., None], (*shape, max(k, 1)))
-        past = np.broadcast_to(np.tile(change, m), (*shape, m * len(self.inputs)))
-        clock = np.zeros((*shape, 1 + len(self.inputs)))
-        memory = np.concatenate([clock, own, past], axis=-1)
-        return State(zero, memory, own[..., 0].copy(), np.zeros(len(self.inputs), dtype=np.bool_))
+        known = np.broadcast_to(known, shape).copy()
+        memory = self._layers.begin_at(np.broadcast_to(change, (*shape, len(self.inputs))), known)
+        return State(zero, memory, known, np.zeros(len(self.inputs), dtype=np.bool_))
 
     def _check_interval(self) -> None:
         check_between(f"model of {self.target}", TICK, GAP, interval=self.interval)
-
-    def _begin(self, change: FloatArray) -> FloatArray:
-        # [time since the last tick, integral of the inputs since then, past deviations, inputs of the last m ticks]
-        k, m = self.orders
-        n = len(self.inputs)
-        memory = np.zeros((*change.shape[:-1], 1 + n + max(k, 1) + m * n))
-        if m:
-            memory[..., -m * n : memory.shape[-1] - (m - 1) * n] = change
-        return memory
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        if change.shape[:-1] != memory.shape[:-1]:  # one initial state for many runs, or many for the same inputs
-            shape = np.broadcast_shapes(change.shape[:-1], memory.shape[:-1])
-            memory = np.broadcast_to(memory, (*shape, memory.shape[-1]))
-            change = np.broadcast_to(change, (*shape, change.shape[-1]))
-        n, (k, m) = len(self.inputs), self.orders
-        phase = self._phase(memory)
-        total, own, past = (
-            memory[..., 1 : 1 + n],
-            memory[..., 1 + n : 1 + n + max(k, 1)],
-            memory[..., 1 + n + max(k, 1) :],
-        )
-        h = self.interval
-        ticks = math.floor((phase + dt) / h + EARLY)
-        if ticks == 0:
-            phase, total = phase + dt, total + dt * change
-        else:
-            mean = (total + (h - phase) * change) / h  # over the interval that ends at the first tick
-            for _ in range(min(ticks, m + 1)):
-                own, past = self._one(own, mean, past)
-                mean = change
-            if ticks > m + 1:
-                own = self._coast(own, np.concatenate([change, past], axis=-1), ticks - m - 1)
-            phase = min(max(phase + dt - ticks * h, -EARLY * h), h)  # clipped: rounding over a very long gap
-            total = phase * change
-        deviation = own[..., 0]
-        if phase > EARLY * h:
-            ahead = self._tick(np.concatenate([own[..., :k], total / phase, past], axis=-1))
-            deviation = deviation + (phase / h) * (ahead - deviation)
-        clock = np.full((*own.shape[:-1], 1), phase)
-        return np.concatenate([clock, total, own, past], axis=-1), deviation
-
-    def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute one tick; return the past deviations and the inputs of the last m ticks, newest first."""
-        k, m = self.orders
-        value = self._tick(np.concatenate([own[..., :k], mean, past], axis=-1))
-        own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
-        return own, np.concatenate([mean, past], axis=-1)[..., : m * len(self.inputs)]
-
-    def _phase(self, memory: FloatArray) -> float:
-        """Return the time since the last tick."""
-        clocks = memory[..., 0]
-        if clocks.ndim == 0:
-            return float(clocks)
-        first = float(clocks.flat[0]) if clocks.size else 0.0
-        if (clocks != first).any():
-            raise InputError(f"model of {self.target}: the runs of a batch must have been started at the same time")
-        return first
 
     def _regressor_names(self) -> list[str]:
         """Return the names of the arguments of `_tick`, such as ``dz(t-1)`` and ``n(t-2)``, with time in ticks."""
@@ -243,21 +150,6 @@ class Autoregressive(Ticking):
     @cached_property
     def _weights(self) -> FloatArray:
         return np.concatenate([np.array(self.a, dtype=np.float64), np.array(self.b, dtype=np.float64).T.ravel()])
-
-    @cached_property
-    def _companion(self) -> FloatArray:
-        return companion(np.array(self.a or (0.0,), dtype=np.float64))
-
-    def _tick(self, regressors: FloatArray) -> FloatArray:
-        value: FloatArray = regressors @ self._weights + self.intercept
-        return value
-
-    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
-        # the difference from the settled value decays with the companion matrix
-        settled = (driven @ self._weights[len(self.a) :] + self.intercept) / (1.0 - sum(self.a))
-        rest = own - settled[..., None]
-        left: FloatArray = rest @ np.linalg.matrix_power(self._companion, ticks).T
-        return settled[..., None] + left
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -324,19 +216,6 @@ class AutoregressiveNet(Ticking):
     def orders(self) -> tuple[int, int]:
         """Orders k and m."""
         return self.k, self.m
-
-    def _tick(self, regressors: FloatArray) -> FloatArray:
-        scaled = self.net.evaluate(self.input_scaling(regressors))
-        return self.output_scaling(scaled)[..., 0] + self.intercept
-
-    def _coast(self, own: FloatArray, driven: FloatArray, ticks: int) -> FloatArray:
-        past = driven[..., len(self.inputs) :]
-        for _ in range(min(ticks, MOST_TICKS)):
-            before = own
-            own, _ = self._one(own, driven[..., : len(self.inputs)], past)
-            if np.array_equal(own, before):
-                break
-        return own
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -9,6 +9,8 @@ from thermocomp.core import lagbank
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Input as Leaf
+from thermocomp.core.expression import Node, Sum, walk_nodes
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.rows import walk
@@ -36,18 +38,35 @@ def contributions(
     dict of str to ndarray of shape (n_rows,)
         By input name [unit of the model]; 0 before the first complete row of a test.
     """
-    model = _paced(model)
-    direct, weights = model.read_out
-    of = np.zeros((len(weights), len(model.inputs)))
-    of[np.arange(len(weights)), _owners(model)] = weights
+    layers = model.layers_with(_parts(model))
+    known = len(model.inputs)
     parts = []
     for state, last in walk(model, table, time, reference=reference):
         if state.memory is None:
-            parts.append(np.zeros(len(model.inputs)))
+            parts.append(np.zeros(known))
         else:
-            parts.append(model.change(state, last) * direct + state.memory @ of)
-    found = np.array(parts, dtype=np.float64).reshape(len(parts), len(model.inputs))
+            parts.append(layers.advance(state.memory, model.change(state, last), 0.0)[1][..., -known:])
+    found = np.array(parts, dtype=np.float64).reshape(len(parts), known)
     return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
+
+
+def _parts(model: ErrorModel) -> list[Node]:
+    """Return the terms of each input in the deviation, as expressions."""
+    node = model.expression(model.leaves)
+    parts: dict[int, list[Node]] = {k: [] for k in range(len(model.inputs))}
+    for term in node.terms if isinstance(node, Sum) else (node,):
+        match sorted({n.index for n in walk_nodes(term) if isinstance(n, Leaf)}):
+            case []:
+                continue  # the intercept
+            case [index]:
+                parts[index].append(term)
+            case several:
+                names = ", ".join(model.inputs[k].name for k in several)
+                raise InputError(
+                    f"model of {model.target}: a term depends on several inputs ({names}), so its deviation has no "
+                    "contribution of each input"
+                )
+    return [Sum(tuple(terms)) for terms in parts.values()]
 
 
 def gains(model: ErrorModel, step: float) -> list[Gain]:

@@ -4,7 +4,7 @@ The leaves are the inputs minus their reference values. A tree represents the mo
 clipped to that range, widened by the margin; the effect of `Support` beyond it (``hold``, ``fade``) is not included.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -214,6 +214,30 @@ def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float =
     found: list[Node] = [Constant(constant)] if constant else []
     found += [Product((Constant(w), x)) for w, x in zip(weights, of, strict=True) if w != 0]
     return Sum(tuple(found))
+
+
+def children(node: Node) -> tuple[Node, ...]:
+    """Return the expressions from which a node is computed."""
+    match node:
+        case Constant() | Input() | Past():
+            return ()
+        case Sum(parts) | Product(parts):
+            return parts
+        case Difference(of, minus):
+            return (of, minus)
+        case PacedLag(of, pace=pace):
+            return (of, pace)
+        case Recurrence(tick):
+            return (tick,)
+    return (node.of,)
+
+
+def walk_nodes(node: Node, leaves: tuple[type, ...] = ()) -> Iterator[Node]:
+    """Yield a node and all its descendants, without those of nodes of the types `leaves`."""
+    yield node
+    if not isinstance(node, leaves):
+        for part in children(node):
+            yield from walk_nodes(part, leaves)
 
 
 def replace_leaves(node: Node, leaf: Callable[[Node], Node | None]) -> Node:

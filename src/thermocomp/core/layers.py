@@ -41,9 +41,17 @@ def _added(forms: Sequence[Form]) -> Form:
 
 
 class Forms:
-    """Several linear forms of values."""
+    """Several linear forms of values.
 
-    def __init__(self, forms: Sequence[Form]) -> None:
+    Parameters
+    ----------
+    forms : sequence of Form
+    exact : bool
+        Each reading of a batch gives the same as alone to the last bit, which a matrix product does not.
+    """
+
+    def __init__(self, forms: Sequence[Form], exact: bool = False) -> None:
+        self._exact = exact
         self._single = all(len(f.weights) == 1 for f in forms)
         self._constant = np.array([f.constant for f in forms], dtype=np.float64)
         self._any_constant = bool(self._constant.any())
@@ -63,7 +71,7 @@ class Forms:
         """Return the forms, (..., n_forms), of values, (..., n_slots)."""
         found = values.take(self._slots, axis=-1)
         if not self._single:
-            found = found @ self._weights
+            found = (found[..., None] * self._weights).sum(axis=-2) if self._exact else found @ self._weights
         elif self._scales:
             found = found * self._weights
         return found + self._constant if self._any_constant else found
@@ -133,12 +141,12 @@ class Layers:
         forms = [builder.form(node) for node in outputs]
         places, self._layers, self.n_memory = builder.lay()
         self._forms = [_moved(f, places) for f in forms]
-        self._outputs = Forms(self._forms)
+        self._outputs = Forms(self._forms, builder.exact)
         self._n = n_inputs + len(places)
 
     @property
     def linear(self) -> list[tuple[FloatArray, float]]:
-        """Weights, (n_inputs,), and constant of each output, if all outputs are linear forms of the inputs; else empty."""
+        """Weights, (n_inputs,), and constant of each output if all are linear forms of the inputs; else empty."""
         if self._layers:
             return []
         found = []
@@ -155,8 +163,17 @@ class Layers:
         self._run(memory, change, np.inf)
         return memory
 
+    def begin_at(self, change: FloatArray, value: FloatArray) -> FloatArray:
+        """Return the memory of a machine at steady state for `change`, whose values with a clock are known, (...)."""
+        memory = self.begin(change)
+        for layer in self._layers:
+            if isinstance(layer, _Ticks):
+                values = self._run(memory.copy(), change, np.inf)
+                memory[..., layer.memory] = layer.ticker.begin_at(value, layer.inputs.evaluate(values))
+        return memory
+
     def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        """Return the memory `dt` seconds later, after the inputs changed to `change`, and the outputs, (..., n_outputs)."""
+        """Return the memory `dt` seconds later, at the inputs `change`, and the outputs, (..., n_outputs)."""
         if memory.shape[:-1] != change.shape[:-1]:  # one state for many readings, or many for one
             shape = np.broadcast_shapes(memory.shape[:-1], change.shape[:-1])
             memory = np.broadcast_to(memory, (*shape, self.n_memory))
@@ -215,7 +232,7 @@ class _Builder:
             known = self._forms[id(node)] = node, self._new_form(node)
         return known[1]
 
-    def _new_form(self, node: e.Node) -> Form:  # noqa: PLR0911 - one case per node type
+    def _new_form(self, node: e.Node) -> Form:  # noqa: PLR0911, PLR0912 - one case per node type
         match node:
             case e.Constant(value):
                 return Form((), value)
@@ -277,6 +294,11 @@ class _Builder:
         """Return a form of a single slot: the result of a form of several is a value of its own."""
         return form if len(form.weights) == 1 else self._value("linear", form)
 
+    @property
+    def exact(self) -> bool:
+        """Whether curves, which may have steps, are among the values."""
+        return any(s.curve is not None for s in self._slots)
+
     def lay(self) -> tuple[list[int], list[_Layer | _Lags | _Ticks], int]:
         """Return the place of each slot, the layers in the order of computation, and the number of lags."""
         groups: dict[tuple[object, ...], list[_Slot]] = {}
@@ -296,12 +318,12 @@ class _Builder:
             if (recurrence := members[0].recurrence) is not None:
                 (slot,) = members
                 ticker = _ticker(recurrence)
-                inputs = Forms([_moved(f, places) for f in slot.operands])
+                inputs = Forms([_moved(f, places) for f in slot.operands], self.exact)
                 layers.append(_Ticks(own, slice(memory, memory + ticker.n_memory), inputs, ticker))
                 memory += ticker.n_memory
                 continue
             operands = tuple(
-                Forms([_moved(f, places) for f in column])
+                Forms([_moved(f, places) for f in column], self.exact)
                 for column in zip(*(s.operands for s in members), strict=True)
             )
             numbers = np.array([s.numbers for s in members]).T

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core import lagbank
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import ENTRIES, GAP, LEAST, check_between, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
@@ -60,7 +59,6 @@ class LinearDynamic(ErrorModel):
     """
 
     family: Literal["linear-dynamic"] = "linear-dynamic"
-    remembers: ClassVar[bool] = True
 
     signals: tuple[Term, ...]
     direct: tuple[float, ...]
@@ -97,15 +95,6 @@ class LinearDynamic(ErrorModel):
             np.array(self.time_constants, dtype=np.float64),
             np.array(self.lagged, dtype=np.float64),
         )
-
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return self._table.evaluate(change)[..., self._arrays[1]]
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        direct, follows, tau, lagged = self._arrays
-        signals = self._table.evaluate(change)
-        memory = lagbank.advance(memory, signals[..., follows], dt, tau)
-        return memory, signals @ direct + memory @ lagged + self.intercept
 
     def _expression(self, change: Sequence[Node]) -> Node:
         signals = self._table.expressions(change)

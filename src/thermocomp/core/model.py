@@ -24,6 +24,7 @@ from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.family import ModelFamily
 from thermocomp.core.inputs import Input, Support, TrainedRange
 from thermocomp.core.joint import JointSupport
+from thermocomp.core.layers import Layers
 from thermocomp.core.provenance import HonestError, Provenance, read_approval
 from thermocomp.core.rows import walk
 from thermocomp.core.state import State
@@ -175,8 +176,9 @@ class ErrorModel(ModelFamily):
         change = inputs - reference
         clipped, outside = self.clip(change)
         if memory is None:
-            memory, dt = self._begin(clipped), 0.0
-        memory, deviation = self._advance(memory, clipped, dt)
+            memory, dt = self._layers.begin(clipped), 0.0
+        memory, found = self._layers.advance(memory, clipped, dt)
+        deviation = found[..., 0]
         if self.support.policy != "clip":
             far = np.zeros(change.shape[:-1]) if self.joint is None else self.joint.distance(change)
             deviation = self._range.keep(self.support, state.deviation, deviation, change, clipped, far)
@@ -228,10 +230,11 @@ class ErrorModel(ModelFamily):
         if self.band is None or state.memory is None:
             return np.full(np.shape(inputs)[:-1], np.nan)
         change = self.change(state, inputs)
+        found = self._layers.advance(state.memory, change, 0.0)[1]
         kept: FloatArray | float = 0.0
         if self.support.policy != "clip":
-            kept = np.abs(self._advance(state.memory, change, 0.0)[1] - state.deviation)
-        spread = np.sqrt((self._directions(state.memory, change) ** 2).sum(axis=-1))
+            kept = np.abs(found[..., 0] - state.deviation)
+        spread = np.sqrt((found[..., 1:] ** 2).sum(axis=-1))
         return self.band.half_width(change, spread) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
@@ -251,8 +254,8 @@ class ErrorModel(ModelFamily):
             mean 0 and standard deviation 1. n_directions is 0 if the model is not an average.
         """
         change = self.change(state, inputs)
-        memory = self._begin(change) if state.memory is None else state.memory
-        return self._directions(memory, change)
+        memory = self._layers.begin(change) if state.memory is None else state.memory
+        return self._layers.advance(memory, change, 0.0)[1][..., 1:]
 
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return a reading relative to its reference, clipped to the training range."""
@@ -317,6 +320,29 @@ class ErrorModel(ModelFamily):
     @cached_property
     def _range(self) -> TrainedRange:
         return TrainedRange.of(self.inputs, self.support)
+
+    @cached_property
+    def leaves(self) -> tuple[Leaf, ...]:
+        """Inputs as leaves of an expression."""
+        return tuple(Leaf(k, i.name) for k, i in enumerate(self.inputs))
+
+    @cached_property
+    def _layers(self) -> Layers:
+        return self.layers_with()
+
+    def layers_with(self, further: Sequence[Node] = ()) -> Layers:
+        """Return the deviation, the spread and further expressions as functions of the clipped changes of the inputs.
+
+        The memory is that of `step` if the further expressions contain no other lags.
+        """
+        return Layers(
+            [self._expression(self.leaves), *self.spread_expressions(self.leaves), *further], len(self.inputs)
+        )
+
+    @property
+    def remembers(self) -> bool:
+        """False: the deviation depends only on the current reading."""
+        return self._layers.n_memory > 0
 
     @property
     def bounds(self) -> tuple[list[float], list[float], list[float]]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -226,7 +226,6 @@ class Network(ErrorModel):
     """
 
     family: Literal["network"] = "network"
-    remembers: ClassVar[bool] = False
 
     net: Perceptron
     input_scaling: Affine
@@ -246,13 +245,6 @@ class Network(ErrorModel):
                 "make one model for each output"
             )
         check_finite(owner, intercept=self.intercept)
-
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return np.empty((*change.shape[:-1], 0))
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
-        scaled = self.net.evaluate(self.input_scaling(change))
-        return memory, self.output_scaling(scaled)[..., 0] + self.intercept
 
     def _expression(self, change: Sequence[Node]) -> Node:
         names = [x.name for x in self.inputs]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -97,7 +97,6 @@ class PacedDynamic(ErrorModel):
     """
 
     family: Literal["paced-dynamic"] = "paced-dynamic"
-    remembers: ClassVar[bool] = True
 
     time_constants: tuple[float, ...]
     temperatures: tuple[LaggedInput, ...]
@@ -173,18 +172,6 @@ class PacedDynamic(ErrorModel):
         lagged = [t.lagged[k] for k in range(len(self.time_constants)) for t in self.temperatures]
         return direct, np.array(lagged + [s.weight for s in self.states], dtype=np.float64)
 
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return self.bank.signals(change)[0]
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
-        direct, weights = self.read_out
-        memory = self.bank.advance(memory, change, dt)
-        return memory, change @ direct + memory @ weights + self.intercept
-
-    def _directions(self, memory: FloatArray, change: FloatArray) -> FloatArray:
-        direct, lagged = self.spread_out
-        return np.asarray(change @ direct + memory @ lagged)
-
     @cached_property
     def spread_out(self) -> tuple[FloatArray, FloatArray]:
         """Readout coefficients of the spread: of inputs, (n_inputs, n_spread), and of states, (n_memory, n_spread)."""
@@ -195,17 +182,31 @@ class PacedDynamic(ErrorModel):
             direct[t.input] += table[k]
         return direct, table[count:]
 
-    def _expression(self, change: Sequence[Node]) -> Node:
-        weights: list[float] = []
-        parts: list[Node] = []
-        for t in self.temperatures:
-            weights += [t.direct, *t.lagged]
-            parts += [change[t.input], *(Lag(change[t.input], tau) for tau in self.time_constants)]
+    def _terms(self, change: Sequence[Node]) -> tuple[list[Node], list[Node], list[Node]]:
+        """Return the temperatures, their lags (temperature by temperature), and the states of the speed."""
+        direct = [change[t.input] for t in self.temperatures]
+        lags: list[Node] = [Lag(node, tau) for node in direct for tau in self.time_constants]
+        states: list[Node] = []
         for s in self.states:
             share = scale_node(1 / self.top_speed, Magnitude(change[s.input]))
-            weights.append(s.weight)
-            parts.append(PacedLag(Power(share, s.power), s.stopped, s.running, share))
-        return sum_weighted(weights, parts, self.intercept)
+            states.append(PacedLag(Power(share, s.power), s.stopped, s.running, share))
+        return direct, lags, states
+
+    def _expression(self, change: Sequence[Node]) -> Node:
+        direct, lags, states = self._terms(change)
+        count, weights, parts = len(self.time_constants), list[float](), list[Node]()
+        for k, t in enumerate(self.temperatures):
+            weights += [t.direct, *t.lagged]
+            parts += [direct[k], *lags[k * count : (k + 1) * count]]
+        weights += [s.weight for s in self.states]
+        return sum_weighted(weights, [*parts, *states], self.intercept)
+
+    def spread_expressions(self, change: Sequence[Node]) -> Sequence[Node]:
+        """Return the outputs of the rows of `spread`."""
+        direct, lags, states = self._terms(change)
+        count = len(self.time_constants)
+        by_lag = [lags[k * count + j] for j in range(count) for k in range(len(direct))]
+        return [sum_weighted(row, [*direct, *by_lag, *states]) for row in self.spread]
 
     @property
     def sensors(self) -> tuple[str, ...]:

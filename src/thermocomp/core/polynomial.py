@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -51,7 +51,6 @@ class Polynomial(ErrorModel):
     """
 
     family: Literal["polynomial"] = "polynomial"
-    remembers: ClassVar[bool] = False
 
     variables: tuple[Variable, ...]
     terms: tuple[Term, ...]
@@ -73,12 +72,6 @@ class Polynomial(ErrorModel):
     @cached_property
     def _coefficients(self) -> FloatArray:
         return np.array(self.coefficients, dtype=np.float64)
-
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return np.empty((*change.shape[:-1], 0))
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
-        return memory, self._table.evaluate(change) @ self._coefficients + self.intercept
 
     def _expression(self, change: Sequence[Node]) -> Node:
         return sum_weighted(self.coefficients, self._table.expressions(change), self.intercept)

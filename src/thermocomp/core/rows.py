@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,9 @@ from thermocomp.core.zero import Zeroing, find_zero
 class Stepped(Protocol):
     """Interface of a model for a replay; see `thermocomp.core.model.ErrorModel`."""
 
-    remembers: ClassVar[bool]
+    @property
+    def remembers(self) -> bool:
+        """False: the output depends only on the current reading."""
 
     @property
     def target(self) -> str:

@@ -1,4 +1,16 @@
-"""A value that is updated at every tick of a clock of its own (P-01): see `thermocomp.core.autoregressive`."""
+"""A value that is updated at every tick of a clock of its own (P-01).
+
+The clock ticks every `interval`; readings may come at any time:
+
+- A reading represents the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input of
+  a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is the
+  reading itself.
+- Ticks are computed when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
+  equal, the rest of a gap is one matrix power (for a net, the loop ends once its output has settled).
+- Between two ticks the value is interpolated linearly from the last tick towards the next one, which is computed
+  with the mean of the inputs since the last tick. The value is continuous in time, so that a reading at 14.9 s
+  instead of 15.1 s makes no significant difference; at the tick it is exact.
+"""
 
 import math
 from collections.abc import Callable
@@ -50,6 +62,12 @@ class Ticker:
             first = 1 + self._n + max(self._k, 1)
             memory[..., first : first + self._n] = inputs
         return memory
+
+    def begin_at(self, value: FloatArray, inputs: FloatArray) -> FloatArray:
+        """Return the memory of a value, (...), and inputs, (..., n_inputs), that have long been constant."""
+        clock = np.zeros((*value.shape, 1 + self._n))
+        own = np.broadcast_to(value[..., None], (*value.shape, max(self._k, 1)))
+        return np.concatenate([clock, own, np.tile(inputs, self._m)], axis=-1)
 
     def advance(self, memory: FloatArray, inputs: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:
         """Return the memory and the value `dt` seconds later; between two ticks it is interpolated."""

@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
-from thermocomp.core.autoregressive import companion, find_largest_root
+from thermocomp.core.autoregressive import find_largest_root
+from thermocomp.core.ticker import companion
 from thermocomp.models.numerics import ticks
 from thermocomp.models.numerics.ticks import TickedRun
 

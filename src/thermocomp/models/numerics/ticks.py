@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
-from thermocomp.core.autoregressive import EARLY
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.ticker import EARLY
 
 #: a displacement between two rows is interpolated if their distance is at most this many usual steps
 NEAR = 1.5
