@@ -114,7 +114,7 @@ class _Slot:
     operands: tuple[Form, ...]
     numbers: tuple[float, ...] = ()
     curve: Curve | None = None
-    recurrence: e.Recurrence | None = None
+    node: e.Lag | e.PacedLag | e.Recurrence | None = None  #: with a memory
 
 
 _WORK: dict[str, Callable[..., FloatArray]] = {
@@ -140,6 +140,8 @@ class Layers:
         builder = _Builder(n_inputs)
         forms = [builder.form(node) for node in outputs]
         places, self._layers, self.n_memory = builder.lay()
+        #: nodes with a memory, in its order
+        self.remembered = builder.remembered
         self._forms = [_moved(f, places) for f in forms]
         self._outputs = Forms(self._forms, builder.exact)
         self._n = n_inputs + len(places)
@@ -263,13 +265,13 @@ class _Builder:
             case e.Lookup(of, x, y, kind):
                 return self._value("curve", self.form(of), curve=Curve(x, y, kind))
             case e.Lag(of, tau):
-                return self._value("lag", self.form(of), numbers=(1.0 / tau, 0.0))
+                return self._value("lag", self.form(of), numbers=(1.0 / tau, 0.0), node=node)
             case e.PacedLag(of, stopped, running, pace):
                 numbers = (1.0 / stopped, 1.0 / running - 1.0 / stopped)
-                return self._value("paced", self.form(of), self.form(pace), numbers=numbers)
+                return self._value("paced", self.form(of), self.form(pace), numbers=numbers, node=node)
             case e.Recurrence(tick, interval):
                 inputs = [self.form(leaf) for leaf in Clock(tick, interval).leaves]
-                return self._value("recurrence", *inputs, recurrence=node)
+                return self._value("recurrence", *inputs, node=node)
         raise InputError(f"{node!r} cannot be compiled")
 
     def _value(
@@ -278,13 +280,13 @@ class _Builder:
         *operands: Form,
         numbers: tuple[float, ...] = (),
         curve: Curve | None = None,
-        recurrence: e.Recurrence | None = None,
+        node: e.Lag | e.PacedLag | e.Recurrence | None = None,
     ) -> Form:
         """Return the form of a value that is computed."""
         if kind not in ("linear", "recurrence"):
             operands = tuple(self._single(f) for f in operands)
         level = 1 + max((self._levels[k] for f in operands for k, _ in f.weights), default=0)
-        slot = _Slot(level, kind, operands, numbers, curve, recurrence)
+        slot = _Slot(level, kind, operands, numbers, curve, node)
         if slot not in self._slots:
             self._slots[slot] = len(self._levels)
             self._levels.append(level)
@@ -303,7 +305,13 @@ class _Builder:
         """Return the place of each slot, the layers in the order of computation, and the number of lags."""
         groups: dict[tuple[object, ...], list[_Slot]] = {}
         for slot in sorted(self._slots, key=lambda s: s.level):
-            key = (slot.level, slot.kind, len(slot.operands), slot.curve, slot.recurrence)
+            key = (
+                slot.level,
+                slot.kind,
+                len(slot.operands),
+                slot.curve,
+                slot.node if slot.kind == "recurrence" else None,
+            )
             groups.setdefault(key, []).append(slot)
         places = list(range(self._n_inputs)) + [0] * len(self._slots)
         begin = self._n_inputs
@@ -311,11 +319,12 @@ class _Builder:
             for k, slot in enumerate(members):
                 places[self._slots[slot]] = begin + k
             begin += len(members)
+        self.remembered = tuple(s.node for members in groups.values() for s in members if s.node is not None)
         layers, memory = list[_Layer | _Lags | _Ticks](), 0
         for members in groups.values():
             first = places[self._slots[members[0]]]
             own = slice(first, first + len(members))
-            if (recurrence := members[0].recurrence) is not None:
+            if isinstance(recurrence := members[0].node, e.Recurrence):
                 (slot,) = members
                 ticker = _ticker(recurrence)
                 inputs = Forms([_moved(f, places) for f in slot.operands], self.exact)

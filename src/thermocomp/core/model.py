@@ -345,6 +345,11 @@ class ErrorModel(ModelFamily):
         return self._layers.n_memory > 0
 
     @property
+    def remembered(self) -> tuple[Node, ...]:
+        """Lags and values with a clock, in the order of the memory."""
+        return self._layers.remembered
+
+    @property
     def bounds(self) -> tuple[list[float], list[float], list[float]]:
         """Minimum and maximum change of each input with its margin, and the fade distance beyond them."""
         low, high, span = self._range

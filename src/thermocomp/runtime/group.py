@@ -7,10 +7,9 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import GAP
+from thermocomp.core.layers import Layers
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.state import State
-from thermocomp.core.together import Together, TogetherState
 from thermocomp.runtime.gate import Ranges
 
 #: reported as outside if each input is inside its own range but their combination is unlike the training
@@ -18,7 +17,7 @@ TOGETHER = "inputs together"
 
 
 class Group:
-    """Models with the same inputs, states and zero, each with a separate read-out; or a single model of any family.
+    """Models with the same inputs, memory and zero, evaluated jointly; or a single model.
 
     Parameters
     ----------
@@ -32,8 +31,7 @@ class Group:
         self.members = tuple(members)
         self.models = tuple(models[k] for k in members)
         self.lead = self.models[0]
-        paced = [m for m in self.models if isinstance(m, PacedDynamic)]
-        self._together = Together(paced) if len(paced) == len(self.models) > 1 else None
+        self._joint = _Joint(self.models) if len(self.models) > 1 else None
         self.ranges = Ranges(self.lead.inputs)
         self._apart = list(dict.fromkeys(m.joint for m in self.models if m.joint is not None))
 
@@ -42,8 +40,7 @@ class Group:
         """Return the groups of models, in the order of their first members."""
         alike: dict[object, list[int]] = {}
         for k, m in enumerate(models):
-            key = Together.key(m) if isinstance(m, PacedDynamic) else None
-            alike.setdefault(k if key is None else (key, m.zeroing), []).append(k)
+            alike.setdefault(k if m.support.policy != "clip" else _key(m), []).append(k)
         return tuple(Group(models, members) for members in alike.values())
 
     def share(self, states: Sequence[State]) -> list[State]:
@@ -67,19 +64,14 @@ class Group:
             Half-widths of the uncertainty bands; nan without a band.
         """
         lead = states[0]
-        if self._together is None or any(
-            s.memory is not lead.memory or s.reference is not lead.reference for s in states
-        ):
+        if self._joint is None or any(s.memory is not lead.memory or s.reference is not lead.reference for s in states):
             each = [m.step(s, values, dt) for m, s in zip(self.models, states, strict=True)]
             widths = [
                 math.nan if m.band is None else float(m.half_width(s, values))
                 for m, (s, _) in zip(self.models, each, strict=True)
             ]
             return self.share([s for s, _ in each]), [float(d) for _, d in each], widths
-        before = TogetherState(lead.reference, lead.memory, lead.reference, lead.outside)
-        after, deviations = self._together.step(before, values, min(dt, GAP))
-        found = [State(after.reference, after.memory, d, after.outside) for d in deviations]
-        return found, deviations.tolist(), self._together.half_widths(after).tolist()
+        return self._joint.step(lead, values, min(dt, GAP))
 
     def beyond(self, states: Sequence[State], values: FloatArray) -> list[str]:
         """Return the inputs that are outside the trained range of a model."""
@@ -88,6 +80,44 @@ class Group:
         change = values - states[0].reference
         near = all(joint.distance(change) <= 1.0 for joint in self._apart)
         return [] if near else [TOGETHER]
+
+
+def _key(model: ErrorModel) -> object:
+    """Return what models have in common that can be evaluated jointly."""
+    speeds = None if model.band is None else model.band.speeds
+    return model.inputs, model.support, model.zeroing, model.remembered, speeds
+
+
+class _Joint:
+    """Models with the same `_key`, compiled together."""
+
+    def __init__(self, models: Sequence[ErrorModel]) -> None:
+        self._lead, leaves = models[0], models[0].leaves
+        spreads = [m.spread_expressions(leaves) for m in models]
+        nodes = [*(m.expression(leaves) for m in models), *(node for nodes in spreads for node in nodes)]
+        self._layers, self._n = Layers(nodes, len(leaves)), len(models)
+        self._sum = np.repeat(np.eye(len(models)), [len(s) for s in spreads], axis=0)  # (n_spread of all, n_models)
+        bands = [m.band for m in models]
+        self._floor = np.array([np.nan if b is None else b.floor for b in bands]) ** 2
+        self._running = np.array([np.nan if b is None else b.running for b in bands])
+        self._stopped = np.array([np.nan if b is None else b.stopped for b in bands])
+
+    def step(self, state: State, values: FloatArray, dt: float) -> tuple[list[State], list[float], list[float]]:
+        """Process a reading: see `Group.step`."""
+        begins, lead = state.memory is None, self._lead
+        reference = lead.settle(state.reference, values) if begins else state.reference
+        change, outside = lead.clip(values - reference)
+        memory = self._layers.begin(change) if state.memory is None else state.memory
+        memory, said = self._layers.advance(memory, change, 0.0 if begins else dt)
+        deviations, widths = said[: self._n], np.full(self._n, np.nan)
+        if lead.band is not None:
+            spread = said[self._n :] ** 2 @ self._sum
+            factor: FloatArray = np.maximum(self._running, self._stopped)
+            if lead.band.speeds:
+                factor = self._running if lead.band.turning(change) else self._stopped
+            widths = factor * np.sqrt(self._floor + spread)
+        found = [State(reference, memory, d, outside) for d in deviations]
+        return found, deviations.tolist(), widths.tolist()
 
 
 def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
