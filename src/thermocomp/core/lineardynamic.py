@@ -5,10 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import ENTRIES, GAP, LEAST, check_between, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Lag, Node, sum_weighted
@@ -86,15 +82,6 @@ class LinearDynamic(ErrorModel):
     def _table(self) -> TermTable:
         singles = tuple(Variable.single(x.name, i) for i, x in enumerate(self.inputs))
         return TermTable(len(self.inputs), singles, self.signals)
-
-    @cached_property
-    def _arrays(self) -> tuple[FloatArray, NDArray[np.intp], FloatArray, FloatArray]:
-        return (
-            np.array(self.direct, dtype=np.float64),
-            np.array(self.lag_signals, dtype=np.intp),
-            np.array(self.time_constants, dtype=np.float64),
-            np.array(self.lagged, dtype=np.float64),
-        )
 
     def _expression(self, change: Sequence[Node]) -> Node:
         signals = self._table.expressions(change)

@@ -172,16 +172,6 @@ class PacedDynamic(ErrorModel):
         lagged = [t.lagged[k] for k in range(len(self.time_constants)) for t in self.temperatures]
         return direct, np.array(lagged + [s.weight for s in self.states], dtype=np.float64)
 
-    @cached_property
-    def spread_out(self) -> tuple[FloatArray, FloatArray]:
-        """Readout coefficients of the spread: of inputs, (n_inputs, n_spread), and of states, (n_memory, n_spread)."""
-        count = len(self.temperatures)
-        table = np.array(self.spread, dtype=np.float64).reshape(len(self.spread), count + len(self.bank.rates)).T
-        direct = np.zeros((len(self.inputs), len(self.spread)))
-        for k, t in enumerate(self.temperatures):
-            direct[t.input] += table[k]
-        return direct, table[count:]
-
     def _terms(self, change: Sequence[Node]) -> tuple[list[Node], list[Node], list[Node]]:
         """Return the temperatures, their lags (temperature by temperature), and the states of the speed."""
         direct = [change[t.input] for t in self.temperatures]

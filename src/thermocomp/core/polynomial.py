@@ -5,9 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import numpy as np
-
-from thermocomp.core.arrays import FloatArray
 from thermocomp.core.bounds import ENTRIES, NODES, check_count, check_finite
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.expression import Node, sum_weighted
@@ -68,10 +65,6 @@ class Polynomial(ErrorModel):
     @cached_property
     def _table(self) -> TermTable:
         return TermTable(len(self.inputs), self.variables, self.terms)
-
-    @cached_property
-    def _coefficients(self) -> FloatArray:
-        return np.array(self.coefficients, dtype=np.float64)
 
     def _expression(self, change: Sequence[Node]) -> Node:
         return sum_weighted(self.coefficients, self._table.expressions(change), self.intercept)

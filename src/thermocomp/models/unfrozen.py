@@ -13,6 +13,7 @@ from sklearn.utils.validation import check_is_fitted
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.expression import Node
 from thermocomp.core.inputs import Input
+from thermocomp.core.layers import Layers
 from thermocomp.core.model import ErrorModel
 from thermocomp.models.base import FloatArray, StaticRegressor
 
@@ -76,8 +77,6 @@ class EstimatorModel(ErrorModel):
     """
 
     family: str = "estimator"
-    remembers: ClassVar[bool] = False
-
     estimator: UnfrozenRegressor = field(compare=False)
     fingerprint: str
     known: Mapping[bytes, Any] = field(default_factory=dict, compare=False, repr=False)
@@ -85,14 +84,9 @@ class EstimatorModel(ErrorModel):
     def _check(self) -> None:
         check_is_fitted(self.estimator)
 
-    def _begin(self, change: FloatArray) -> FloatArray:
-        return np.empty((*change.shape[:-1], 0))
-
-    def _advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
-        if change.ndim == 1 and (before := self.known.get(change.tobytes())) is not None:
-            return memory, before
-        rows = change.reshape(-1, change.shape[-1])
-        return memory, self.estimator._predict(rows).reshape(change.shape[:-1])
+    def layers_with(self, further: Sequence[Node] = ()) -> Layers:  # noqa: ARG002 - an estimator is no expression
+        """Return the estimator in place of expressions."""
+        return _Estimated(self)
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -109,3 +103,18 @@ class EstimatorModel(ErrorModel):
     def formula(self) -> str:
         """Return a description of the model in one line of text."""
         return f"{self.estimator.name} of {', '.join(self.sensors)}: no formula"
+
+
+class _Estimated(Layers):
+    """An estimator in place of expressions."""
+
+    def __init__(self, model: EstimatorModel) -> None:
+        super().__init__([], len(model.inputs))
+        self._model = model
+
+    def advance(self, memory: FloatArray, change: FloatArray, dt: float) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
+        known = self._model.known
+        if change.ndim == 1 and (before := known.get(change.tobytes())) is not None:
+            return memory, np.array([before])
+        rows = change.reshape(-1, change.shape[-1])
+        return memory, self._model.estimator._predict(rows).reshape(*change.shape[:-1], 1)
