@@ -24,6 +24,10 @@ class ModelFamily(ABC):
         """
         return ()
 
+    def _order_memory(self, change: Sequence[Node]) -> Sequence[Node]:  # noqa: ARG002 - in the order of the expression
+        """Return the lags in the order of the memory, if it is not that of their first use."""
+        return ()
+
     @abstractmethod
     def coefficients_by_name(self) -> dict[str, float]:
         """Return the coefficient of each term of `formula`."""

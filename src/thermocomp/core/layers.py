@@ -89,7 +89,7 @@ class _Lags(NamedTuple):
     """First-order lags, in adjacent slots; rate = rest + pace * gain."""
 
     slots: slice
-    memory: slice
+    memory: slice | IntArray
     signals: Forms
     rest: FloatArray  #: [1/s]
     gain: FloatArray  #: [1/s]
@@ -133,11 +133,15 @@ class Layers:
     outputs : sequence of Node
     n_inputs : int
         Number of inputs; the leaves of the expressions are inputs.
+    first : sequence of Node
+        Nodes with a memory in the order of the memory; others follow in the order of the outputs.
     """
 
-    def __init__(self, outputs: Sequence[e.Node], n_inputs: int) -> None:
+    def __init__(self, outputs: Sequence[e.Node], n_inputs: int, first: Sequence[e.Node] = ()) -> None:
         self.n_inputs = n_inputs
         builder = _Builder(n_inputs)
+        for node in first:
+            builder.form(node)
         forms = [builder.form(node) for node in outputs]
         places, self._layers, self.n_memory = builder.lay()
         #: nodes with a memory, in its order
@@ -208,7 +212,7 @@ class Layers:
                 rates = layer.rest if layer.paces is None else layer.rest + layer.paces.evaluate(values) * layer.gain
                 signals -= held
                 signals *= np.expm1(-dt * rates)
-                held -= signals
+                memory[..., layer.memory] = held - signals
             values[..., layer.slots] = memory[..., layer.memory]
         return values
 
@@ -319,17 +323,20 @@ class _Builder:
             for k, slot in enumerate(members):
                 places[self._slots[slot]] = begin + k
             begin += len(members)
-        self.remembered = tuple(s.node for members in groups.values() for s in members if s.node is not None)
-        layers, memory = list[_Layer | _Lags | _Ticks](), 0
+        tickers = {s: _ticker(s.node) for s in self._slots if isinstance(s.node, e.Recurrence)}
+        kept = [s for s in self._slots if s.node is not None]  # in the order of their first use
+        self.remembered = tuple(s.node for s in kept if s.node is not None)
+        ends = np.cumsum([0, *(tickers[s].n_memory if s in tickers else 1 for s in kept)])
+        begin_of = dict(zip(kept, ends.tolist(), strict=False))
+        layers = list[_Layer | _Lags | _Ticks]()
         for members in groups.values():
             first = places[self._slots[members[0]]]
             own = slice(first, first + len(members))
-            if isinstance(recurrence := members[0].node, e.Recurrence):
+            if (ticker := tickers.get(members[0])) is not None:
                 (slot,) = members
-                ticker = _ticker(recurrence)
                 inputs = Forms([_moved(f, places) for f in slot.operands], self.exact)
-                layers.append(_Ticks(own, slice(memory, memory + ticker.n_memory), inputs, ticker))
-                memory += ticker.n_memory
+                memory = slice(begin_of[slot], begin_of[slot] + ticker.n_memory)
+                layers.append(_Ticks(own, memory, inputs, ticker))
                 continue
             operands = tuple(
                 Forms([_moved(f, places) for f in column], self.exact)
@@ -339,11 +346,16 @@ class _Builder:
             if (kind := members[0].kind) in ("lag", "paced"):
                 rest, gain = numbers
                 paces = operands[1] if kind == "paced" else None
-                layers.append(_Lags(own, slice(memory, memory + len(members)), operands[0], rest, gain, paces))
-                memory += len(members)
+                layers.append(_Lags(own, _places([begin_of[s] for s in members]), operands[0], rest, gain, paces))
             else:
                 layers.append(_Layer(own, operands, _work_of(members[0], numbers)))
-        return places, layers, memory
+        return places, layers, int(ends[-1])
+
+
+def _places(found: list[int]) -> slice | IntArray:
+    """Return places in the memory, as a slice if they are adjacent."""
+    adjacent = found == list(range(found[0], found[0] + len(found)))
+    return slice(found[0], found[0] + len(found)) if adjacent else np.array(found, dtype=np.intp)
 
 
 def _work_of(slot: _Slot, numbers: FloatArray) -> Callable[..., FloatArray]:
@@ -360,15 +372,17 @@ def _work_of(slot: _Slot, numbers: FloatArray) -> Callable[..., FloatArray]:
 
 
 def _ticker(node: e.Recurrence) -> Ticker:
-    clock = Clock(node.tick, node.interval)
-    k, n = clock.past, len(clock.leaves)
-    tick = Layers([_regressed(node.tick, clock)], k + (clock.means + 1) * n)
+    parts = list(e.walk_nodes(node.tick, (e.Mean,)))
+    leaves = Clock(node.tick, node.interval).leaves
+    k = max((p.ticks for p in parts if isinstance(p, e.Past)), default=0)
+    m, n = max((p.ticks for p in parts if isinstance(p, e.Mean)), default=0), len(leaves)
+    tick = Layers([_regressed(node.tick, k, leaves)], k + (m + 1) * n)
     nothing = np.empty(0)
     linear = tick.linear[0] if tick.linear else None
-    return Ticker(lambda given: tick.advance(nothing, given, 0.0)[1][..., 0], linear, node.interval, k, clock.means, n)
+    return Ticker(lambda given: tick.advance(nothing, given, 0.0)[1][..., 0], linear, node.interval, k, m, n)
 
 
-def _regressed(node: e.Node, clock: Clock) -> e.Node:
+def _regressed(node: e.Node, k: int, leaves: Sequence[e.Node]) -> e.Node:
     """Return an expression of a tick with its past values and means as inputs."""
 
     def leaf(node: e.Node) -> e.Node | None:
@@ -376,7 +390,7 @@ def _regressed(node: e.Node, clock: Clock) -> e.Node:
             case e.Past(ticks):
                 return e.Input(ticks - 1, "")
             case e.Mean(of, ticks):
-                return e.Input(clock.past + ticks * len(clock.leaves) + clock.leaves.index(of), "")
+                return e.Input(k + ticks * len(leaves) + leaves.index(of), "")
         return None
 
     return e.replace_leaves(node, leaf)

@@ -84,9 +84,12 @@ class LinearDynamic(ErrorModel):
         return TermTable(len(self.inputs), singles, self.signals)
 
     def _expression(self, change: Sequence[Node]) -> Node:
-        signals = self._table.expressions(change)
-        lags = [Lag(signals[k], tau) for k, tau in zip(self.lag_signals, self.time_constants, strict=True)]
+        signals, lags = self._table.expressions(change), self._order_memory(change)
         return sum_weighted((*self.direct, *self.lagged), (*signals, *lags), self.intercept)
+
+    def _order_memory(self, change: Sequence[Node]) -> Sequence[Node]:
+        signals = self._table.expressions(change)
+        return [Lag(signals[k], tau) for k, tau in zip(self.lag_signals, self.time_constants, strict=True)]
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -335,9 +335,8 @@ class ErrorModel(ModelFamily):
 
         The memory is that of `step` if the further expressions contain no other lags.
         """
-        return Layers(
-            [self._expression(self.leaves), *self.spread_expressions(self.leaves), *further], len(self.inputs)
-        )
+        nodes = [self._expression(self.leaves), *self.spread_expressions(self.leaves), *further]
+        return Layers(nodes, len(self.inputs), self._order_memory(self.leaves))
 
     @property
     def remembers(self) -> bool:

@@ -172,31 +172,31 @@ class PacedDynamic(ErrorModel):
         lagged = [t.lagged[k] for k in range(len(self.time_constants)) for t in self.temperatures]
         return direct, np.array(lagged + [s.weight for s in self.states], dtype=np.float64)
 
-    def _terms(self, change: Sequence[Node]) -> tuple[list[Node], list[Node], list[Node]]:
-        """Return the temperatures, their lags (temperature by temperature), and the states of the speed."""
-        direct = [change[t.input] for t in self.temperatures]
-        lags: list[Node] = [Lag(node, tau) for node in direct for tau in self.time_constants]
-        states: list[Node] = []
+    def _order_memory(self, change: Sequence[Node]) -> Sequence[Node]:
+        lags: list[Node] = [Lag(change[t.input], tau) for tau in self.time_constants for t in self.temperatures]
         for s in self.states:
             share = scale_node(1 / self.top_speed, Magnitude(change[s.input]))
-            states.append(PacedLag(Power(share, s.power), s.stopped, s.running, share))
-        return direct, lags, states
+            lags.append(PacedLag(Power(share, s.power), s.stopped, s.running, share))
+        return lags
+
+    def _terms(self, change: Sequence[Node]) -> list[Node]:
+        """Return the temperatures, their lags, lag by lag, and the states of the speed."""
+        return [*(change[t.input] for t in self.temperatures), *self._order_memory(change)]
 
     def _expression(self, change: Sequence[Node]) -> Node:
-        direct, lags, states = self._terms(change)
-        count, weights, parts = len(self.time_constants), list[float](), list[Node]()
-        for k, t in enumerate(self.temperatures):
+        terms, n = self._terms(change), len(self.temperatures)
+        order, weights = list[int](), list[float]()
+        for k, t in enumerate(self.temperatures):  # each temperature is followed by its lags
+            order += range(k, n * (1 + len(self.time_constants)), n)
             weights += [t.direct, *t.lagged]
-            parts += [direct[k], *lags[k * count : (k + 1) * count]]
+        order += range(len(order), len(terms))
         weights += [s.weight for s in self.states]
-        return sum_weighted(weights, [*parts, *states], self.intercept)
+        return sum_weighted(weights, [terms[k] for k in order], self.intercept)
 
     def spread_expressions(self, change: Sequence[Node]) -> Sequence[Node]:
         """Return the outputs of the rows of `spread`."""
-        direct, lags, states = self._terms(change)
-        count = len(self.time_constants)
-        by_lag = [lags[k * count + j] for j in range(count) for k in range(len(direct))]
-        return [sum_weighted(row, [*direct, *by_lag, *states]) for row in self.spread]
+        terms = self._terms(change)
+        return [sum_weighted(row, terms) for row in self.spread]
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ class _Joint:
         self._lead, leaves = models[0], models[0].leaves
         spreads = [m.spread_expressions(leaves) for m in models]
         nodes = [*(m.expression(leaves) for m in models), *(node for nodes in spreads for node in nodes)]
-        self._layers, self._n = Layers(nodes, len(leaves)), len(models)
+        self._layers, self._n = Layers(nodes, len(leaves), models[0].remembered), len(models)
         self._sum = np.repeat(np.eye(len(models)), [len(s) for s in spreads], axis=0)  # (n_spread of all, n_models)
         bands = [m.band for m in models]
         self._floor = np.array([np.nan if b is None else b.floor for b in bands]) ** 2
