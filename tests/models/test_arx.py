@@ -271,7 +271,7 @@ def test_bad_data(estimator: ARX | NetARX) -> None:
         estimator.fit(u[:3], z[:3], dt=clock(3))
     with pytest.raises(InputError, match="dt: expected 50 non-negative time steps"):
         estimator.fit(u, z, dt=[1.0])
-    with pytest.raises(InputError, match="not negative"):
+    with pytest.raises(InputError, match="non-negative"):
         estimator.fit(u, z, dt=-clock(50))
     with pytest.raises(InputError, match="cycle: expected 50"):
         estimator.fit(u, z, dt=clock(50), cycle=[0])
