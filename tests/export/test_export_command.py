@@ -387,7 +387,7 @@ def test_a_name_in_any_script_stands_as_it_is(tmp_path: Path, to: str) -> None:
         ),
         (b"", "it is empty"),
         (b"G0 X1\n", "it begins with 'G0 X1'"),
-        (b"PK\x03\x04\xff\xfe", "it is not text, as an XLSX or a Parquet file is none"),
+        (b"PK\x03\x04\xff\xfe", "it is not a text file"),
         (b'{"format": "other"}', 'it has no "format": "thermocomp-model", found \'other\'; name the file that'),
         (b"[1, 2]", 'it has no "format": "thermocomp-model", found none; name the file that'),
     ],

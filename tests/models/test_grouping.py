@@ -142,7 +142,7 @@ def test_no_threshold_of_a_correlation(threshold: float) -> None:
 
 @pytest.mark.parametrize("C", [np.ones((2, 3)), np.array([[1, 0.5], [0.4, 1]]), np.full((2, 2), np.nan)])
 def test_no_correlation_matrix(C: FloatArray) -> None:
-    with pytest.raises(InputError, match="square, symmetric and finite"):
+    with pytest.raises(InputError, match="square, symmetric, finite"):
         grouping.group(C, 0.9)
 
 

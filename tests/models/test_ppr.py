@@ -175,7 +175,7 @@ def test_bad_input_is_refused() -> None:
         ProjectionPursuit().fit(spoiled, y)
     with pytest.raises(ValueError, match="1 sample"):
         ProjectionPursuit().fit(X[:1], y[:1])
-    with pytest.raises(FitError, match="a single row"):
+    with pytest.raises(FitError, match="only one training row"):
         ProjectionPursuit().fit(X, y, cycle=np.where(np.arange(40) == 5, 0, -1))
     with pytest.raises(InputError, match="max_terms 0: expected at least 1"):
         ProjectionPursuit(max_terms=0).fit(X, y)
