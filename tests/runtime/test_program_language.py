@@ -9,11 +9,11 @@ from thermocomp.judging.compiled import rows  # noqa: F401 - has functions of th
 from thermocomp.runtime.program import models, steps  # noqa: F401
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.language import choose, each, find_function, is_known, let, otherwise, record, when
-from thermocomp.runtime.program.memory import Memory
-from thermocomp.runtime.program.values import Truth, flag, integer, real
-from thermocomp.runtime.program.variables import RECORDS, State, Tables, Work
+from thermocomp.runtime.program.memory import FlatMemory
+from thermocomp.runtime.program.values import Condition, flag, integer, real
+from thermocomp.runtime.program.variables import RECORDS, Constants, Kept, Work
 
-S, W, T = State(), Work(), Tables()
+S, W, T = Kept(), Work(), Constants()
 
 
 def recorded(write: Callable[[], object]) -> list[n.Statement]:
@@ -54,7 +54,7 @@ def assign_a_sum() -> None:
     ("write", "says"),
     [
         (use_as_a_condition, "neither true nor false"),
-        (assign_an_unknown, "is not a variable of State"),
+        (assign_an_unknown, "is not a variable of Kept"),
         (index_twice, "2 indices for 1 dimensions"),
         (change_the_kind, "declared as real and as int"),
         (go_on_without_a_branch, "must follow `when`"),
@@ -83,14 +83,14 @@ def test_statements_are_recorded_in_order() -> None:
     assert isinstance(branch, n.If)
     assert len(branch.body) == len(branch.other) == 1
     assert isinstance(last, n.Assign)
-    assert last.target == State.variables()["clock"].node
+    assert last.target == Kept.variables()["clock"].node
 
 
 def test_the_result_of_an_operation_with_a_time_is_a_time() -> None:
     assert (S.clock - 1.0).node.kind == "time"
     assert (2.0 * (W.value[0] + 1.0)).node.kind == "real"
     assert abs(S.clock).node.kind == "time"
-    assert isinstance(flag(True) & (S.clock > W.value[0]), Truth)
+    assert isinstance(flag(True) & (S.clock > W.value[0]), Condition)
 
 
 def test_a_recording_that_fails_leaves_nothing_behind() -> None:
@@ -112,14 +112,14 @@ def names_in(name: str) -> set[tuple[str, str]]:
     for node in n.walk(find_function(name).body):
         if isinstance(node, n.Name) and node.record:
             found.add((node.record, node.name))
-        if isinstance(node, n.Run | n.Call) and is_known(node.name):
+        if isinstance(node, n.ProcedureCall | n.Call) and is_known(node.name):
             found |= names_in(node.name)
     return {(letter, name) for letter, name in found if name in RECORDS[letter].variables()}
 
 
 def test_memory_is_laid_out_without_overlaps() -> None:
     sizes = {"CHANNELS": 3, "RANGES": 2, "SENSORS": 2, "MODELS": 2}
-    memory = Memory(sizes, {"rate": 0.5, "channel": [1, 2], "leans_on": [[True, False], [False, True]]})
+    memory = FlatMemory(sizes, {"rate": 0.5, "channel": [1, 2], "leans_on": [[True, False], [False, True]]})
     assert memory.find("t", "rate") == 0.5
     assert memory.find("t", "leans_on").tolist() == [[1, 0], [0, 1]]
     memory.find("s", "zero")[:] = [7.0, 8.0]

@@ -290,7 +290,7 @@ class _Builder:
         if kind not in ("linear", "recurrence"):
             operands = tuple(self._single(f) for f in operands)
         level = 1 + max((self._levels[k] for f in operands for k, _ in f.weights), default=0)
-        slot = _Slot(level, kind, operands, numbers, curve, node)
+        slot = _Slot(level=level, kind=kind, operands=operands, numbers=numbers, curve=curve, node=node)
         if slot not in self._slots:
             self._slots[slot] = len(self._levels)
             self._levels.append(level)
@@ -346,7 +346,8 @@ class _Builder:
             if (kind := members[0].kind) in ("lag", "paced"):
                 rest, gain = numbers
                 paces = operands[1] if kind == "paced" else None
-                layers.append(_Lags(own, _places([begin_of[s] for s in members]), operands[0], rest, gain, paces))
+                where = _places([begin_of[s] for s in members])
+                layers.append(_Lags(slots=own, memory=where, signals=operands[0], rest=rest, gain=gain, paces=paces))
             else:
                 layers.append(_Layer(own, operands, _work_of(members[0], numbers)))
         return places, layers, int(ends[-1])
@@ -379,7 +380,14 @@ def _ticker(node: e.Recurrence) -> Ticker:
     tick = Layers([_regressed(node.tick, k, leaves)], k + (m + 1) * n)
     nothing = np.empty(0)
     linear = tick.linear[0] if tick.linear else None
-    return Ticker(lambda given: tick.advance(nothing, given, 0.0)[1][..., 0], linear, node.interval, k, m, n)
+    return Ticker(
+        lambda given: tick.advance(nothing, given, 0.0)[1][..., 0],
+        linear,
+        interval=node.interval,
+        k=k,
+        m=m,
+        n_inputs=n,
+    )
 
 
 def _regressed(node: e.Node, k: int, leaves: Sequence[e.Node]) -> e.Node:

@@ -7,7 +7,7 @@ from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.watch import Watch
 from thermocomp.judging.compiled.machine import run
 from thermocomp.judging.compiled.rows import believe_rows
-from thermocomp.runtime.program.memory import Memory
+from thermocomp.runtime.program.memory import FlatMemory
 from thermocomp.runtime.program.tables import constants_of_watch
 
 
@@ -34,7 +34,7 @@ def run_watch(
         See `thermocomp.runtime.watch.WORDS`.
     """
     sizes, constants = constants_of_watch(watch, reference)
-    memory = Memory(sizes | {"ROWS": len(time)}, constants)
+    memory = FlatMemory(sizes | {"ROWS": len(time)}, constants)
     passed, faults = memory.find("r", "value"), memory.find("r", "fault")
     memory.find("r", "time")[:], memory.find("r", "resting")[:], passed[:] = time, resting, values
     run(believe_rows, memory)

@@ -53,7 +53,7 @@ class _Writer(Printer):
         match node:
             case n.Assign(target, value):
                 return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};"]
-            case n.Run(name, arguments):
+            case n.ProcedureCall(name, arguments):
                 given = [self._as(a, "real" if a.kind == "time" else a.kind) for a in arguments]
                 return [f"{pad}tc_{name}({', '.join(['s', 'w', *given])});"]
             case n.Return(value):

@@ -97,15 +97,15 @@ class _Writer(Printer):
     def statement(self, node: n.Statement, depth: int) -> list[str]:  # noqa: PLR0911 - one case per node type
         pad, inner = "    " * depth, depth + 1
         match node:
-            case n.Assign(target, n.Choice(_, test, one, other)):
+            case n.Assign(target, n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Assign(target, one)], [n.Assign(target, other)]), depth)
             case n.Assign(target, value):
                 return [f"{pad}{self.value(target)} := {self.bare(value)};"]
-            case n.Return(n.Choice(_, test, one, other)):
+            case n.Return(n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Return(one)], [n.Return(other)]), depth)
             case n.Return(value):
                 return [f"{pad}{self._local(f'{self._name}_{self.function.name}')} := {self.bare(value)};"]
-            case n.Run(name, arguments):
+            case n.ProcedureCall(name, arguments):
                 return [f"{pad}{self._call(name, arguments, list(BAGS))};"]
             case n.If(test, body, other):
                 lines = [f"{pad}IF {self.bare(test)} THEN", *self.block(body, inner)]
@@ -139,7 +139,7 @@ class _Writer(Printer):
     def element(self, array: n.Name, at: Sequence[n.Expression]) -> str:
         index = at[0]
         for dim, inner in zip(array.dims[1:], at[1:], strict=True):
-            width = n.Constant("int", max(self.sizes[dim], 1))
+            width = n.Numeral("int", max(self.sizes[dim], 1))
             index = n.Operation("int", "+", n.Operation("int", "*", index, width), inner)
         return f"{self.value(array)}[{self.bare(index)}]"
 

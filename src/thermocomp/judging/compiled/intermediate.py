@@ -29,14 +29,14 @@ _POINTERS = ", ".join(f"ptr noalias {'' if a[0] in 'swr' else 'readonly '}%{a}" 
 def write_module(functions: Sequence[Callable[..., None]]) -> str:
     """Return procedures of the program, and all that they call, as the text of a module.
 
-    Each procedure takes pointers to the arrays of `thermocomp.runtime.program.memory.Memory`, in the order of `ARRAYS`.
+    Each procedure takes pointers to the arrays of `FlatMemory`, in the order of `ARRAYS`.
     """
     found: dict[str, str] = {}
 
     def add(name: str) -> None:
         function = find_function(name)
         for node in n.walk(function.body):
-            if isinstance(node, n.Call | n.Run) and node.name not in found and is_known(node.name):
+            if isinstance(node, n.Call | n.ProcedureCall) and node.name not in found and is_known(node.name):
                 add(node.name)
         found[name] = _Writer(function).text(is_public=name in names)
 
@@ -111,7 +111,7 @@ class _Writer:
         match node:
             case n.Assign(target, value):
                 self._store(target, self._value(value))
-            case n.Run(name, arguments):
+            case n.ProcedureCall(name, arguments):
                 given = [f"ptr %{a}" for a in ARRAYS] + [f"{_TYPES[a.kind]} {self._value(a)}" for a in arguments]
                 self._lines.append(f"  call void @{name}({', '.join(given)})")
             case n.Return(value):
@@ -181,7 +181,7 @@ class _Writer:
 
     def _value(self, node: Expression) -> str:  # noqa: PLR0911 - one case per node type
         match node:
-            case n.Constant(kind, value):
+            case n.Numeral(kind, value):
                 return _constant(kind, value)
             case n.Name(kind, name, "t") if name in SIZES:
                 size = self._size(name)
@@ -198,12 +198,12 @@ class _Writer:
             case n.Real(_, of):
                 return self._new(f"sitofp i64 {self._value(of)} to double")
             case n.Operation(_, "and", left, right):
-                return self._chosen("i1", left, right, n.Constant("bool", 0))
+                return self._chosen("i1", left, right, n.Numeral("bool", 0))
             case n.Operation(_, "or", left, right):
-                return self._chosen("i1", left, n.Constant("bool", 1), right)
+                return self._chosen("i1", left, n.Numeral("bool", 1), right)
             case n.Operation():
                 return self._operation(node)
-            case n.Choice(kind, test, one, other):
+            case n.Conditional(kind, test, one, other):
                 return self._chosen(_TYPES[kind], test, one, other)
             case n.Call(_, name, arguments):
                 given = ", ".join(f"double {self._value(a)}" for a in arguments)

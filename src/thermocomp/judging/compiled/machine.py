@@ -8,7 +8,7 @@ import llvmlite.binding as llvm
 
 from thermocomp.judging.compiled import rows
 from thermocomp.judging.compiled.intermediate import write_module
-from thermocomp.runtime.program.memory import ARRAYS, Memory
+from thermocomp.runtime.program.memory import ARRAYS, FlatMemory
 
 
 @cache
@@ -31,6 +31,6 @@ def _compiled(name: str) -> Callable[..., None]:
     return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(ARRAYS))(address)
 
 
-def run(procedure: Callable[..., None], memory: Memory) -> None:
+def run(procedure: Callable[..., None], memory: FlatMemory) -> None:
     """Run a procedure of `thermocomp.judging.compiled.rows` on the variables of a compensator."""
     _compiled(procedure.__name__)(*(memory.arrays[name].ctypes.data for name in ARRAYS))

@@ -1,12 +1,12 @@
 """Procedures over all rows of a test, in the language of the program."""
 
 from thermocomp.runtime.program.language import each, procedure
-from thermocomp.runtime.program.variables import Rows, State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, TestRows, Work
 from thermocomp.runtime.program.watching import believe
 
 
 @procedure
-def believe_rows(s: State, w: Work, t: Tables, r: Rows) -> None:
+def believe_rows(s: Kept, w: Work, t: Constants, r: TestRows) -> None:
     """Replace temperatures that are not trusted, reading by reading."""
     for row in each("row", t.ROWS):
         w.now = r.time[row]

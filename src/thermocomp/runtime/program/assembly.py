@@ -1,12 +1,13 @@
 """The functions that a compensator needs, without branches that it does not use."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from thermocomp.runtime.program import steps
 from thermocomp.runtime.program.language import find_function, is_known
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.program.tree import Call, For, Function, If, Kind, Name, Run, Statement, While, walk
+from thermocomp.runtime.program.tree import Call, For, Function, If, Kind, Name, ProcedureCall, Statement, While, walk
 
 
 def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> list[Function]:
@@ -23,9 +24,13 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
         function = tables.formulas.get(name) or find_function(own.get(name, name))
         body = _decided(function.body, tables.sizes)
         for node in walk(body):
-            if isinstance(node, Call | Run) and node.name not in found and (is_known(node.name) or node.name in own):
+            if (
+                isinstance(node, Call | ProcedureCall)
+                and node.name not in found
+                and (is_known(node.name) or node.name in own)
+            ):
                 add(node.name)
-        found[name] = Function(name, function.about, function.parameters, body, function.locals, function.is_of_numbers)
+        found[name] = replace(function, name=name, body=body)
 
     add(steps.step.__name__)
     return list(found.values())

@@ -4,12 +4,12 @@ from thermocomp.runtime.blame import AGAINST, USUAL
 from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, flag, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
 
 
 @procedure
-def blame(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     """Exclude failed sensors: a swapped pair if it explains all, and better than one sensor; else single sensors."""
     for i in each("i", t.SENSORS):
         w.able[i] = w.calm[i] | w.waiting[i]
@@ -53,7 +53,7 @@ def blame(s: State, w: Work, t: Tables, elapsed: Number) -> None:
 
 
 @procedure
-def find_one(s: State, w: Work, t: Tables) -> None:
+def find_one(s: Kept, w: Work, t: Constants) -> None:
     """Find the sensor whose failure explains most of the current readings."""
     differ(s, w, t)
     for i in each("i", t.SENSORS):
@@ -63,7 +63,7 @@ def find_one(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def differ(s: State, w: Work, t: Tables) -> None:
+def differ(s: Kept, w: Work, t: Constants) -> None:
     """Compute in `weighed` the differences between the current readings and the predictions from the other sensors."""
     for i in each("i", t.SENSORS):
         w.weighed[i] = w.x[i]
@@ -74,7 +74,7 @@ def differ(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def weigh_one(s: State, w: Work, t: Tables) -> None:
+def weigh_one(s: Kept, w: Work, t: Constants) -> None:
     """Find the sensor whose failure, immediate or lagged, leaves the smallest differences."""
     w.one = -1
     w.one_rest = 0.0
@@ -101,7 +101,7 @@ def weigh_one(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def weigh_swaps(s: State, w: Work, t: Tables, counts: Number) -> None:
+def weigh_swaps(s: Kept, w: Work, t: Constants, counts: Number) -> None:
     """Weigh the evidence for swapped sensors, and find the pair whose exchange leaves the smallest differences."""
     differ(s, w, t)
     w.both = -1
@@ -140,7 +140,7 @@ def weigh_swaps(s: State, w: Work, t: Tables, counts: Number) -> None:
 
 
 @procedure
-def fail(s: State, w: Work, t: Tables) -> None:
+def fail(s: Kept, w: Work, t: Constants) -> None:
     """Exclude sensors, and remove the effect of their last readings on the predictions."""
     fails = let("fails", flag(False))
     for i in each("i", t.SENSORS):

@@ -3,14 +3,14 @@
 from thermocomp.runtime.program.formulas import tick
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, repeat_while, when
 from thermocomp.runtime.program.numbers import smaller
-from thermocomp.runtime.program.values import Truth, Whole, flag, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.values import Condition, Whole, flag, real
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 MOST_TICKS = 2e9
 
 
 @procedure
-def run_clock(s: State, w: Work, t: Tables, c: Whole, begun: Truth) -> None:
+def run_clock(s: Kept, w: Work, t: Constants, c: Whole, begun: Condition) -> None:
     """Advance a value to the current time, with linear interpolation between two ticks."""
     dt = let("dt", w.step)
     first = let("first", t.leaf_begin[c])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.tree import Kind
-from thermocomp.runtime.program.values import Number, Numbers, Truth, Truths, Whole, Wholes
+from thermocomp.runtime.program.values import Condition, Number, Numbers, Truths, Whole, Wholes
 
 
 class Var:
@@ -62,11 +62,11 @@ class truth(Var):  # noqa: N801
     def __init__(self, about: str) -> None:
         super().__init__("bool", about)
 
-    def __get__(self, record: object, owner: object = None) -> Truth:
-        return Truth(self.node)
+    def __get__(self, record: object, owner: object = None) -> Condition:
+        return Condition(self.node)
 
-    def __set__(self, record: object, value: Truth | bool) -> None:
-        Truth(self.node).set(value)
+    def __set__(self, record: object, value: Condition | bool) -> None:
+        Condition(self.node).set(value)
 
 
 class numbers(Var):  # noqa: N801

@@ -3,11 +3,11 @@
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, sqrt, when
 from thermocomp.runtime.program.numbers import larger, smaller
 from thermocomp.runtime.program.values import Whole, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 
 @procedure
-def find_distances(s: State, w: Work, t: Tables, k: Whole) -> None:
+def find_distances(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     """Compute `excess`, the largest of all single inputs, and `distance`, of all inputs together."""
     w.excess = 0.0
     for m in each("m", t.member_begin[k], t.member_begin[k + 1]):
@@ -31,7 +31,7 @@ def find_distances(s: State, w: Work, t: Tables, k: Whole) -> None:
 
 
 @procedure
-def find_nearest(s: State, w: Work, t: Tables, k: Whole, columns: Whole) -> None:
+def find_nearest(s: Kept, w: Work, t: Constants, k: Whole, columns: Whole) -> None:
     """Compute in `distance` the distance to the nearest training state; 1 is the limit."""
     nearest = let("nearest", real(0.0))
     for p in each("p", t.points[k]):

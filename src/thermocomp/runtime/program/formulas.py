@@ -2,19 +2,19 @@
 
 from thermocomp.runtime.program.language import procedure
 from thermocomp.runtime.program.values import Whole
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 
 @procedure
-def models_absolute(s: State, w: Work, t: Tables) -> None:
+def models_absolute(s: Kept, w: Work, t: Constants) -> None:
     """Compute the deviations of the models without inputs relative to the start."""
 
 
 @procedure
-def models_rezeroed(s: State, w: Work, t: Tables) -> None:
+def models_rezeroed(s: Kept, w: Work, t: Constants) -> None:
     """Compute the deviations of the models with inputs relative to the start."""
 
 
 @procedure
-def tick(s: State, w: Work, t: Tables, c: Whole) -> None:
+def tick(s: Kept, w: Work, t: Constants, c: Whole) -> None:
     """Compute a value with a separate clock at its next tick."""

@@ -13,12 +13,12 @@ from typing import ParamSpec, TypeVar
 
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.declarations import Record
-from thermocomp.runtime.program.recording import RECORDING, Recording, add
+from thermocomp.runtime.program.trace import TRACE, Trace, add
 from thermocomp.runtime.program.tree import Kind
-from thermocomp.runtime.program.values import Number, Truth, Value, Whole, common_kind, integer, real
+from thermocomp.runtime.program.values import Condition, Number, Symbol, Whole, common_kind, integer, real
 
 P = ParamSpec("P")
-V = TypeVar("V", Number, Whole, Truth)
+V = TypeVar("V", Number, Whole, Condition)
 
 
 # -- statements -------------------------------------------------------------------------------------------------------
@@ -26,7 +26,7 @@ V = TypeVar("V", Number, Whole, Truth)
 
 def let(name: str, value: V) -> V:
     """Declare a local variable with its first value."""
-    recording = RECORDING.get()
+    recording = TRACE.get()
     kind = value.node.kind
     if recording.locals.setdefault(name, kind) != kind:
         raise TypeError(f"{name}: declared as {recording.locals[name]} and as {kind}")
@@ -37,14 +37,14 @@ def let(name: str, value: V) -> V:
 
 @contextmanager
 def _block(body: list[n.Statement]) -> Iterator[None]:
-    blocks = RECORDING.get().blocks
+    blocks = TRACE.get().blocks
     blocks.append(body)
     yield
     blocks.pop()
 
 
 @contextmanager
-def when(test: Truth) -> Iterator[None]:
+def when(test: Condition) -> Iterator[None]:
     """Record the statements of the ``with`` block for the case that a condition holds."""
     branch = n.If(test.node, [])
     add(branch)
@@ -54,7 +54,7 @@ def when(test: Truth) -> Iterator[None]:
 
 def _last_branch() -> n.If:
     """Return the last branch of the present block, at the end of its chain."""
-    last = RECORDING.get().blocks[-1][-1]
+    last = TRACE.get().blocks[-1][-1]
     while isinstance(last, n.If) and last.other:
         last = last.other[0]
     if not isinstance(last, n.If):
@@ -70,7 +70,7 @@ def otherwise() -> Iterator[None]:
 
 
 @contextmanager
-def otherwise_when(test: Truth) -> Iterator[None]:
+def otherwise_when(test: Condition) -> Iterator[None]:
     """Record the statements of the ``with`` block for the other cases in which a condition holds."""
     branch = n.If(test.node, [])
     _last_branch().other.append(branch)
@@ -81,7 +81,7 @@ def otherwise_when(test: Truth) -> Iterator[None]:
 def each(name: str, begin: Whole | int, end: Whole | int | None = None) -> Iterator[Whole]:
     """Record the body of a ``for`` statement as a loop over integers from `begin` (or 0), `end` excluded."""
     first, last = (integer(0), integer(begin)) if end is None else (integer(begin), integer(end))
-    RECORDING.get().locals.setdefault(name, "int")
+    TRACE.get().locals.setdefault(name, "int")
     loop = n.For(n.Name("int", name), first.node, last.node, [])
     add(loop)
     with _block(loop.body):
@@ -89,7 +89,7 @@ def each(name: str, begin: Whole | int, end: Whole | int | None = None) -> Itera
 
 
 @contextmanager
-def repeat_while(test: Truth) -> Iterator[None]:
+def repeat_while(test: Condition) -> Iterator[None]:
     """Record the statements of the ``with`` block as a loop with a condition."""
     loop = n.While(test.node, [])
     add(loop)
@@ -100,10 +100,10 @@ def repeat_while(test: Truth) -> Iterator[None]:
 # -- expressions ------------------------------------------------------------------------------------------------------
 
 
-def choose(test: Truth, one: Number | float, other: Number | float) -> Number:
+def choose(test: Condition, one: Number | float, other: Number | float) -> Number:
     """Return one of two numbers."""
     pair = real(one), real(other)
-    return Number(n.Choice(common_kind(*pair), test.node, pair[0].node, pair[1].node))
+    return Number(n.Conditional(common_kind(*pair), test.node, pair[0].node, pair[1].node))
 
 
 def call(name: str, *arguments: Number) -> Number:
@@ -149,7 +149,7 @@ _KNOWN: dict[str, Callable[..., object]] = {}
 
 def _nodes(args: Iterable[object]) -> tuple[n.Expression, ...]:
     """Return the arguments other than the records."""
-    return tuple(a.node for a in args if isinstance(a, Value))
+    return tuple(a.node for a in args if isinstance(a, Symbol))
 
 
 def procedure(function: Callable[P, None]) -> Callable[P, None]:
@@ -158,7 +158,7 @@ def procedure(function: Callable[P, None]) -> Callable[P, None]:
     _KNOWN[name] = function
 
     def record(*args: P.args, **_: P.kwargs) -> None:
-        add(n.Run(name, _nodes(args)))
+        add(n.ProcedureCall(name, _nodes(args)))
 
     record.__name__ = name
     return record
@@ -180,12 +180,18 @@ def function(function: Callable[P, Number]) -> Callable[P, Number]:
 def record(name: str) -> Iterator[n.Function]:
     """Record the statements of the ``with`` block as a function that takes the place of a procedure of the program."""
     instead = find_function(name)
-    recording = Recording()
-    token = RECORDING.set(recording)
+    recording = Trace()
+    token = TRACE.set(recording)
     try:
-        yield n.Function(name, instead.about, instead.parameters, recording.blocks[0], recording.locals)
+        yield n.Function(
+            name=name,
+            about=instead.about,
+            parameters=instead.parameters,
+            body=recording.blocks[0],
+            locals=recording.locals,
+        )
     finally:
-        RECORDING.reset(token)
+        TRACE.reset(token)
 
 
 @cache
@@ -201,12 +207,12 @@ def find_function(name: str) -> n.Function:
         kind: Kind = "real" if p.annotation is Number else "int" if p.annotation is Whole else "bool"
         parameters[p.name] = kind
         given.append(p.annotation(n.Name(kind, p.name)))
-    recording = Recording()
-    token = RECORDING.set(recording)
+    recording = Trace()
+    token = TRACE.set(recording)
     try:
         said = written(*given)
     finally:
-        RECORDING.reset(token)
+        TRACE.reset(token)
     body = recording.blocks[0]
     if isinstance(said, Number):
         body.append(n.Return(said.node))

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from thermocomp.runtime.program.declarations import Var
 from thermocomp.runtime.program.tree import Kind
-from thermocomp.runtime.program.variables import RECORDS, Tables
+from thermocomp.runtime.program.variables import RECORDS, Constants
 
 IntArray = NDArray[np.int64]
 
 
-class Place(NamedTuple):
+class Location(NamedTuple):
     """Where a variable stands."""
 
     array: str  #: letter of its record, then ``r`` for real numbers or ``i`` for integers
@@ -27,7 +27,7 @@ def letter_of(kind: Kind) -> str:
 
 
 def _dimensions() -> list[str]:
-    options = [k for k, v in vars(Tables).items() if isinstance(v, Var) and k not in Tables.variables()]
+    options = [k for k, v in vars(Constants).items() if isinstance(v, Var) and k not in Constants.variables()]
     dims = [d for r in RECORDS.values() for v in r.variables().values() for d in v.dims]
     return list(dict.fromkeys([*options, *dims]))
 
@@ -39,22 +39,22 @@ ARRAYS = (*(f"{letter}{kind}" for letter in RECORDS for kind in "ri"), "at", "si
 
 
 @cache
-def find_places() -> dict[tuple[str, str], Place]:
+def find_places() -> dict[tuple[str, str], Location]:
     """Return the place of each variable, by record and name."""
-    found: dict[tuple[str, str], Place] = {}
+    found: dict[tuple[str, str], Location] = {}
     counts, arrays = dict.fromkeys(ARRAYS, 0), 0
     for letter, record in RECORDS.items():
         for name, var in record.variables().items():
             array = f"{letter}{letter_of(var.kind)}"
             if var.dims:
-                found[letter, name], arrays = Place(array, arrays), arrays + 1
+                found[letter, name], arrays = Location(array, arrays), arrays + 1
             else:
-                found[letter, name] = Place(array, counts[array])
+                found[letter, name] = Location(array, counts[array])
                 counts[array] += 1
     return found
 
 
-class Memory:
+class FlatMemory:
     """All variables of a compensator before its first call.
 
     Parameters

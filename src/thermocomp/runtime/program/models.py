@@ -14,8 +14,8 @@ from thermocomp.runtime.program.language import choose, exp, expm1, let, raised,
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
 from thermocomp.runtime.program.supporting import Supports
 from thermocomp.runtime.program.tree import Expression, Function, Name
-from thermocomp.runtime.program.values import Number, Truth, Whole, integer, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.values import Condition, Number, Whole, integer, real
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 #: beyond every argument of a table
 _BEYOND = 1e30
@@ -52,7 +52,7 @@ class Formulas:
         models : iterable of (int, ErrorModel, Node)
             Index, model and formula; the inputs of a formula are numbered like the ranges.
         """
-        s = State()
+        s = Kept()
         with record(f"models_{name}") as self.functions[f"models_{name}"]:
             formula, worked_out = (
                 _Formula(self, s.begun_absolute if name == "absolute" else s.begun_rezeroed),
@@ -135,13 +135,13 @@ class _Arithmetic:
 class _Formula(_Arithmetic):
     """Formula of models, with lags, tables and clocks."""
 
-    def __init__(self, formulas: Formulas, begun: Truth) -> None:
+    def __init__(self, formulas: Formulas, begun: Condition) -> None:
         super().__init__()
         self._formulas, self._begun = formulas, begun
         self._gains: dict[Expression, Number] = {}
 
     def _found(self, node: e.Node) -> Number:
-        own, s, w, t = self._formulas, State(), Work(), Tables()
+        own, s, w, t = self._formulas, Kept(), Work(), Constants()
         match node:
             case e.Input(index):
                 return w.input[own.channels[index]] - s.zero[index]
@@ -167,7 +167,7 @@ class _Formula(_Arithmetic):
         return super()._found(node)
 
     def _lag(self, signal: Number, paces: Number) -> Number:
-        s, place = State(), self._formulas.lags
+        s, place = Kept(), self._formulas.lags
         self._formulas.lags += 1
         if paces.node not in self._gains:
             self._gains[paces.node] = let(f"gain{len(self._gains)}", -expm1(-paces))
@@ -194,7 +194,7 @@ class _Ticking(_Arithmetic):
         self._clock = clock
 
     def _found(self, node: e.Node) -> Number:
-        clock, s, w = self._clock, State(), Work()
+        clock, s, w = self._clock, Kept(), Work()
         match node:
             case e.Past(ticks):
                 return s.past[clock.past_begin + ticks - 1]

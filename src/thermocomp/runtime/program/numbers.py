@@ -16,11 +16,11 @@ from thermocomp.runtime.program.language import (
     when,
 )
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 
 @procedure
-def find_mean(s: State, w: Work, t: Tables) -> None:
+def find_mean(s: Kept, w: Work, t: Constants) -> None:
     """Compute the mean of a column without its outliers in `middle`."""
     total = let("total", real(0.0))
     with when(w.rows < 3):
@@ -56,7 +56,7 @@ def find_mean(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def sort(s: State, w: Work, t: Tables) -> None:
+def sort(s: Kept, w: Work, t: Constants) -> None:
     """Sort the column in ascending order."""
     gap = let("gap", w.rows // 2)
     with repeat_while(gap > 0):
@@ -99,7 +99,7 @@ def clip(value: Number, low: Number, high: Number) -> Number:
 
 
 @procedure
-def find_linear(s: State, w: Work, t: Tables, at: Number, first: Whole, end: Whole) -> None:
+def find_linear(s: Kept, w: Work, t: Constants, at: Number, first: Whole, end: Whole) -> None:
     """Interpolate linearly in a table, with constant values beyond its ends: `found`."""
     find_place(s, w, t, at, first, end)
     k = let("k", w.place)
@@ -113,14 +113,14 @@ def find_linear(s: State, w: Work, t: Tables, at: Number, first: Whole, end: Who
 
 
 @procedure
-def find_step(s: State, w: Work, t: Tables, at: Number, first: Whole, end: Whole) -> None:
+def find_step(s: Kept, w: Work, t: Constants, at: Number, first: Whole, end: Whole) -> None:
     """Look up a value in a table of steps: `found`."""
     find_place(s, w, t, at, first, end)
     w.found = t.table_y[w.place]
 
 
 @procedure
-def find_place(s: State, w: Work, t: Tables, at: Number, first: Whole, end: Whole) -> None:
+def find_place(s: Kept, w: Work, t: Constants, at: Number, first: Whole, end: Whole) -> None:
     """Find the first point of a table beyond a value: `place`."""
     w.place = first
     going = let("going", flag(True))

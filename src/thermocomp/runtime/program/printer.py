@@ -69,13 +69,13 @@ class Printer(ABC):
     def bare(self, node: Expression, kind: Kind | None = None) -> str:
         """Return an expression without outer parentheses."""
         text = self.value(node, kind)
-        outer = text.startswith("(") and isinstance(node, n.Operation | n.Choice)
+        outer = text.startswith("(") and isinstance(node, n.Operation | n.Conditional)
         return text[1:-1] if outer else text
 
     def value(self, node: Expression, kind: Kind | None = None) -> str:  # noqa: PLR0911 - one case per node type
         """Return an expression; a real constant is written as a time if `kind` is ``time``."""
         match node:
-            case n.Constant(own, value):
+            case n.Numeral(own, value):
                 return self.constant(value, "time" if own == "real" and kind == "time" else own)
             case n.Name(own, name, "t") if name in self.sizes and name != "MOST":
                 return self.constant(self.sizes[name], own)
@@ -96,7 +96,7 @@ class Printer(ABC):
                 chained = isinstance(left, n.Operation) and any({operator, left.operator} <= rank for rank in _RANKS)
                 one = self.bare(left, timed) if chained else self.value(left, timed)
                 return f"({one} {self.operators.get(operator, operator)} {self.value(right, timed)})"
-            case n.Choice(own, test, one, other):
+            case n.Conditional(own, test, one, other):
                 return self.choice(self.value(test), self.value(one, own), self.value(other, own))
             case n.Call(_, name, arguments):
                 return self.call(name, arguments)

@@ -24,14 +24,14 @@ from thermocomp.runtime.program.language import (
 )
 from thermocomp.runtime.program.numbers import find_mean, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 STARTS, ACTIVE, HOLDING, FADING, SHADOW = range(5)
 UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 
 @procedure
-def step(s: State, w: Work, t: Tables) -> None:
+def step(s: Kept, w: Work, t: Constants) -> None:
     """Process values of a given age, and move the corrections."""
     tell_time(s, w, t)
     for c in each("c", t.CHANNELS):
@@ -57,7 +57,7 @@ def step(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def tell_time(s: State, w: Work, t: Tables) -> None:
+def tell_time(s: Kept, w: Work, t: Constants) -> None:
     """Determine the time of measurement, and whether it is valid."""
     w.passes = (w.dt >= 0.0) & (w.dt <= GAP)
     w.travel = 0.0
@@ -87,7 +87,7 @@ def tell_time(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def check(s: State, w: Work, t: Tables) -> None:
+def check(s: Kept, w: Work, t: Constants) -> None:
     """Check that all values are present, finite and plausible; while the zero is unknown, also for a start."""
     for r in each("r", t.RANGES):
         c = let("c", t.channel[r])
@@ -105,7 +105,7 @@ def check(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def check_start(s: State, w: Work, t: Tables, g: Whole) -> None:
+def check_start(s: Kept, w: Work, t: Constants, g: Whole) -> None:
     """Check that the temperatures of a model are plausible for a starting machine."""
     w.rows = 0
     for m in each("m", t.set_begin[g], t.set_begin[g + 1]):
@@ -126,7 +126,7 @@ def check_start(s: State, w: Work, t: Tables, g: Whole) -> None:
 
 
 @procedure
-def take(s: State, w: Work, t: Tables) -> None:
+def take(s: Kept, w: Work, t: Constants) -> None:
     """Add a reading to the zero, or pass it to the models and move the corrections accordingly."""
     w.step = 0.0
     with when(s.seen):
@@ -161,7 +161,7 @@ def take(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def gather(s: State, w: Work, t: Tables) -> None:
+def gather(s: Kept, w: Work, t: Constants) -> None:
     """Add a reading to the zero; once the zero is known, process the earlier readings with the models."""
     belongs = let("belongs", s.gathered.equals(0))
     with when(~belongs & (s.gathered < t.MOST) & (w.stands | ~s.resting)):
@@ -200,7 +200,7 @@ def gather(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def drive(s: State, w: Work, t: Tables, k: Whole) -> None:
+def drive(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     """Move a correction towards the value required by its models, within the limits at both ends of the travel."""
     w.offset = 0.0
     w.tilt = 0.0
@@ -228,7 +228,7 @@ def drive(s: State, w: Work, t: Tables, k: Whole) -> None:
 
 
 @procedure
-def idle(s: State, w: Work, t: Tables, k: Whole) -> None:
+def idle(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     """Hold a correction that no model drives, and fade it to zero after the hold time."""
     s.idle[k] = s.idle[k] + w.travel
     with when(s.idle[k] > t.hold):

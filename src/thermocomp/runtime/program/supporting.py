@@ -12,7 +12,7 @@ from thermocomp.runtime.program.distances import find_distances
 from thermocomp.runtime.program.language import let, when
 from thermocomp.runtime.program.numbers import larger
 from thermocomp.runtime.program.values import Number, integer, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 
 class Supports:
@@ -42,7 +42,7 @@ class Supports:
         worked_out : set of int
             Indices of the distances already computed in the function.
         """
-        s, w, t = State(), Work(), Tables()
+        s, w, t = Kept(), Work(), Constants()
         policy = model.support.policy
         if policy == "clip":
             s.deviation[place] = said

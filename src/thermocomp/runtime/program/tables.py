@@ -32,7 +32,7 @@ class Tables(NamedTuple):
     sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
     values: dict[
         str, Any
-    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Tables`
+    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Constants`
     formulas: dict[str, Function]  #: functions generated from the models' formulas
 
 

@@ -10,7 +10,7 @@ Operator = Literal["+", "-", "*", "/", "//", "%", "==", "!=", "<", "<=", ">", ">
 
 
 @dataclass(frozen=True)
-class Constant:
+class Numeral:
     """A number."""
 
     kind: Kind
@@ -71,7 +71,7 @@ class Operation:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Conditional:
     """One of two values; only the chosen one needs to be defined."""
 
     kind: Kind
@@ -89,7 +89,7 @@ class Call:
     arguments: tuple["Expression", ...]
 
 
-Expression = Constant | Name | Element | Negative | Not | Real | Operation | Choice | Call
+Expression = Numeral | Name | Element | Negative | Not | Real | Operation | Conditional | Call
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ class Assign:
 
 
 @dataclass(frozen=True)
-class Run:
+class ProcedureCall:
     """A procedure is called with the records and further arguments."""
 
     name: str
@@ -142,7 +142,7 @@ class Return:
     value: Expression
 
 
-Statement = Assign | Run | If | For | While | Return
+Statement = Assign | ProcedureCall | If | For | While | Return
 
 
 @dataclass(frozen=True)
@@ -168,9 +168,9 @@ def walk(nodes: Iterable[Statement | Expression]) -> Iterator[Statement | Expres
                 yield from walk((of,))
             case Operation(_, _, left, right):
                 yield from walk((left, right))
-            case Choice(_, test, one, other):
+            case Conditional(_, test, one, other):
                 yield from walk((test, one, other))
-            case Call(_, _, arguments) | Run(_, arguments):
+            case Call(_, _, arguments) | ProcedureCall(_, arguments):
                 yield from walk(arguments)
             case Assign(target, value):
                 yield from walk((target, value))
@@ -182,7 +182,7 @@ def walk(nodes: Iterable[Statement | Expression]) -> Iterator[Statement | Expres
                 yield from walk((index, begin, end, *body))
             case While(test, body):
                 yield from walk((test, *body))
-            case Constant() | Name():
+            case Numeral() | Name():
                 pass
             case _:
                 assert_never(node)

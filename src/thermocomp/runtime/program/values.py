@@ -3,11 +3,11 @@
 from typing import NoReturn, cast
 
 from thermocomp.runtime.program import tree as n
-from thermocomp.runtime.program.recording import add
+from thermocomp.runtime.program.trace import add
 from thermocomp.runtime.program.tree import Expression, Kind, Operator
 
 
-class Value:
+class Symbol:
     """An expression of the program."""
 
     def __init__(self, node: Expression) -> None:
@@ -22,28 +22,28 @@ class Value:
         raise TypeError("a symbol is neither true nor false: use `when`, `choose`, & and |")
 
 
-class Truth(Value):
+class Condition(Symbol):
     """A condition; ``&`` and ``|`` evaluate their right side only if it decides."""
 
-    def __and__(self, other: "Truth") -> "Truth":
-        return Truth(n.Operation("bool", "and", self.node, other.node))
+    def __and__(self, other: "Condition") -> "Condition":
+        return Condition(n.Operation("bool", "and", self.node, other.node))
 
-    def __or__(self, other: "Truth") -> "Truth":
-        return Truth(n.Operation("bool", "or", self.node, other.node))
+    def __or__(self, other: "Condition") -> "Condition":
+        return Condition(n.Operation("bool", "or", self.node, other.node))
 
-    def __invert__(self) -> "Truth":
-        return Truth(n.Not("bool", self.node))
+    def __invert__(self) -> "Condition":
+        return Condition(n.Not("bool", self.node))
 
-    def equals(self, other: "Truth") -> "Truth":
+    def equals(self, other: "Condition") -> "Condition":
         """Return the condition that both hold, or neither."""
-        return Truth(n.Operation("bool", "==", self.node, other.node))
+        return Condition(n.Operation("bool", "==", self.node, other.node))
 
-    def set(self, value: "Truth | bool") -> None:
+    def set(self, value: "Condition | bool") -> None:
         """Assign a value to this variable."""
         self._assign(flag(value).node)
 
 
-class Whole(Value):
+class Whole(Symbol):
     """An integer."""
 
     def _with(self, operator: Operator, other: "Whole | int") -> "Whole":
@@ -64,26 +64,26 @@ class Whole(Value):
     def __mod__(self, other: "Whole | int") -> "Whole":
         return self._with("%", other)
 
-    def _compared(self, operator: Operator, other: "Whole | int") -> Truth:
-        return Truth(n.Operation("bool", operator, self.node, integer(other).node))
+    def _compared(self, operator: Operator, other: "Whole | int") -> Condition:
+        return Condition(n.Operation("bool", operator, self.node, integer(other).node))
 
-    def __lt__(self, other: "Whole | int") -> Truth:
+    def __lt__(self, other: "Whole | int") -> Condition:
         return self._compared("<", other)
 
-    def __le__(self, other: "Whole | int") -> Truth:
+    def __le__(self, other: "Whole | int") -> Condition:
         return self._compared("<=", other)
 
-    def __gt__(self, other: "Whole | int") -> Truth:
+    def __gt__(self, other: "Whole | int") -> Condition:
         return self._compared(">", other)
 
-    def __ge__(self, other: "Whole | int") -> Truth:
+    def __ge__(self, other: "Whole | int") -> Condition:
         return self._compared(">=", other)
 
-    def equals(self, other: "Whole | int") -> Truth:
+    def equals(self, other: "Whole | int") -> Condition:
         """Return the condition that both are equal."""
         return self._compared("==", other)
 
-    def differs(self, other: "Whole | int") -> Truth:
+    def differs(self, other: "Whole | int") -> Condition:
         """Return the condition that the two are not equal."""
         return self._compared("!=", other)
 
@@ -97,7 +97,7 @@ class Whole(Value):
         self._assign(integer(value).node)
 
 
-class Number(Value):
+class Number(Symbol):
     """A real number, or a time: the result of an operation with a time is a time, in double precision."""
 
     def _with(self, operator: Operator, other: "Number | float", *, swapped: bool = False) -> "Number":
@@ -135,26 +135,26 @@ class Number(Value):
     def __abs__(self) -> "Number":
         return Number(n.Call(self.node.kind, "abs", (self.node,)))
 
-    def _compared(self, operator: Operator, other: "Number | float") -> Truth:
-        return Truth(n.Operation("bool", operator, self.node, real(other).node))
+    def _compared(self, operator: Operator, other: "Number | float") -> Condition:
+        return Condition(n.Operation("bool", operator, self.node, real(other).node))
 
-    def __lt__(self, other: "Number | float") -> Truth:
+    def __lt__(self, other: "Number | float") -> Condition:
         return self._compared("<", other)
 
-    def __le__(self, other: "Number | float") -> Truth:
+    def __le__(self, other: "Number | float") -> Condition:
         return self._compared("<=", other)
 
-    def __gt__(self, other: "Number | float") -> Truth:
+    def __gt__(self, other: "Number | float") -> Condition:
         return self._compared(">", other)
 
-    def __ge__(self, other: "Number | float") -> Truth:
+    def __ge__(self, other: "Number | float") -> Condition:
         return self._compared(">=", other)
 
-    def equals(self, other: "Number | float") -> Truth:
+    def equals(self, other: "Number | float") -> Condition:
         """Return the condition that both are equal."""
         return self._compared("==", other)
 
-    def differs(self, other: "Number | float") -> Truth:
+    def differs(self, other: "Number | float") -> Condition:
         """Return the condition that the two are not equal."""
         return self._compared("!=", other)
 
@@ -163,19 +163,19 @@ class Number(Value):
         self._assign(real(value).node)
 
 
-def flag(value: Truth | bool) -> Truth:
+def flag(value: Condition | bool) -> Condition:
     """Return a condition, or a truth value as one."""
-    return value if isinstance(value, Truth) else Truth(n.Constant("bool", value))
+    return value if isinstance(value, Condition) else Condition(n.Numeral("bool", value))
 
 
 def integer(value: Whole | int) -> Whole:
     """Return an integer as an expression."""
-    return value if isinstance(value, Whole) else Whole(n.Constant("int", value))
+    return value if isinstance(value, Whole) else Whole(n.Numeral("int", value))
 
 
 def real(value: Number | float) -> Number:
     """Return a number as an expression."""
-    return value if isinstance(value, Number) else Number(n.Constant("real", float(value)))
+    return value if isinstance(value, Number) else Number(n.Numeral("real", float(value)))
 
 
 def common_kind(*values: Number) -> Kind:
@@ -186,7 +186,7 @@ def common_kind(*values: Number) -> Kind:
 Index = Whole | int | tuple[Whole | int, ...]
 
 
-class _Array(Value):
+class _Array(Symbol):
     def _element(self, at: Index) -> n.Element:
         array = cast("n.Name", self.node)
         places = at if isinstance(at, tuple) else (at,)
@@ -218,8 +218,8 @@ class Wholes(_Array):
 class Truths(_Array):
     """An array of conditions."""
 
-    def __getitem__(self, at: Index) -> Truth:
-        return Truth(self._element(at))
+    def __getitem__(self, at: Index) -> Condition:
+        return Condition(self._element(at))
 
-    def __setitem__(self, at: Index, value: Truth | bool) -> None:
+    def __setitem__(self, at: Index, value: Condition | bool) -> None:
         self[at].set(value)

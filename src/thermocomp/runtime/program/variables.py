@@ -1,4 +1,4 @@
-"""State, working memory and constants of the program of a compensator."""
+"""Kept, working memory and constants of the program of a compensator."""
 
 from thermocomp.runtime.program.declarations import (
     Record,
@@ -13,7 +13,7 @@ from thermocomp.runtime.program.declarations import (
 )
 
 
-class State(Record):
+class Kept(Record):
     """Variables kept between calls, initially 0."""
 
     owner = "s"
@@ -137,7 +137,7 @@ class Work(Record):
     both_worst = number("largest of its residuals")
 
 
-class Tables(Record):
+class Constants(Record):
     """Constants: numbers of the models and of the limits, and sizes."""
 
     owner = "t"
@@ -253,7 +253,7 @@ class Tables(Record):
     ROWS = size("rows of a test")
 
 
-class Rows(Record):
+class TestRows(Record):
     """Readings of a test, row by row, and what becomes of them."""
 
     owner = "r"
@@ -265,4 +265,4 @@ class Rows(Record):
 
 
 #: groups of variables by letter
-RECORDS: dict[str, type[Record]] = {"s": State, "w": Work, "t": Tables, "r": Rows}
+RECORDS: dict[str, type[Record]] = {"s": Kept, "w": Work, "t": Constants, "r": TestRows}

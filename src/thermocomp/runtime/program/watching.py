@@ -17,7 +17,7 @@ from thermocomp.runtime.program.language import (
 )
 from thermocomp.runtime.program.numbers import find_mean, follow, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
-from thermocomp.runtime.program.variables import State, Tables, Work
+from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import FADE, GOOD, HEATS, MISSING, REST, RETURN, TICK
 
 COLDEST, HOTTEST = PLAUSIBLE["temperature"]
@@ -26,7 +26,7 @@ HOLDING = 2
 
 
 @procedure
-def believe(s: State, w: Work, t: Tables) -> None:
+def believe(s: Kept, w: Work, t: Constants) -> None:
     """Replace each temperature that is not trusted."""
     w.made = True
     for k in each("k", t.SPEEDS):
@@ -55,7 +55,7 @@ def believe(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def make_up(s: State, w: Work, t: Tables) -> None:
+def make_up(s: Kept, w: Work, t: Constants) -> None:
     """Replace first readings whose distance from their training zero is not plausible given the other sensors."""
     w.rows = 0
     for i in each("i", t.SENSORS):
@@ -77,7 +77,7 @@ def make_up(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def begin(s: State, w: Work, t: Tables) -> None:
+def begin(s: Kept, w: Work, t: Constants) -> None:
     """Add a reading to the zero if it is unknown; start from rest at the zero, or at the first reading."""
     belongs = let("belongs", t.watch_waits & s.watch_gathered.equals(0))
     with when(t.watch_waits & ~belongs & (s.watch_gathered < t.MOST) & (w.stands | ~s.watch_resting)):
@@ -119,7 +119,7 @@ def begin(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def calm_down(s: State, w: Work, t: Tables) -> None:
+def calm_down(s: Kept, w: Work, t: Constants) -> None:
     """Limit speeds to a multiple of the top speed."""
     for k in each("k", t.SPEEDS):
         most = let("most", HEATS * t.top_speed)
@@ -127,7 +127,7 @@ def calm_down(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def predict(s: State, w: Work, t: Tables) -> None:
+def predict(s: Kept, w: Work, t: Constants) -> None:
     """Predict each temperature from the others, their lags and the states of the speed."""
     for i in each("i", t.SENSORS):
         s.predicted[i] = 0.0
@@ -138,7 +138,7 @@ def predict(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def look(s: State, w: Work, t: Tables) -> None:
+def look(s: Kept, w: Work, t: Constants) -> None:
     """Check all sensors and advance the predictions."""
     elapsed = let("elapsed", w.now - s.look)
     s.look = w.now
@@ -177,7 +177,7 @@ def look(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def find_jumps(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+def find_jumps(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     """Find jumps, discard spikes, and confirm lasting jumps."""
     for i in each("i", t.SENSORS):
         slack = let("slack", t.jump_limit[i])
@@ -197,7 +197,7 @@ def find_jumps(s: State, w: Work, t: Tables, elapsed: Number) -> None:
 
 
 @procedure
-def advance(s: State, w: Work, t: Tables, elapsed: Number) -> None:
+def advance(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     """Advance the lags of the temperatures and the states of the speed."""
     for k in each("k", t.SPEEDS):
         w.change[t.speed_input[k]] = w.value[t.watch_channel[t.speed_input[k]]] - s.watch_zero[t.speed_input[k]]
@@ -216,7 +216,7 @@ def advance(s: State, w: Work, t: Tables, elapsed: Number) -> None:
 
 
 @procedure
-def find_stuck(s: State, w: Work, t: Tables) -> None:
+def find_stuck(s: Kept, w: Work, t: Constants) -> None:
     """Find sensors with constant readings although the prediction, or for too long another sensor, has changed."""
     lives = let("lives", flag(False))
     for i in each("i", t.SENSORS):
@@ -240,7 +240,7 @@ def find_stuck(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def find_off(s: State, w: Work, t: Tables) -> None:
+def find_off(s: Kept, w: Work, t: Constants) -> None:
     """Find differences that have been too large for too long."""
     rested = let("rested", ~s.was_fast | (w.now - s.fast > REST))
     for i in each("i", t.SENSORS):
@@ -257,7 +257,7 @@ def find_off(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def believe_again(s: State, w: Work, t: Tables) -> None:
+def believe_again(s: Kept, w: Work, t: Constants) -> None:
     """Trust a missing sensor again once its readings agree with the prediction."""
     for i in each("i", t.SENSORS):
         fits = let("fits", s.fault[i].equals(MISSING) & w.there[i] & (abs(w.difference[i]) <= t.off_limit[i]))
@@ -273,7 +273,7 @@ def believe_again(s: State, w: Work, t: Tables) -> None:
 
 
 @procedure
-def judge(s: State, w: Work, t: Tables, k: Whole) -> None:
+def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     """Hold a correction if its models were judged harmful, or not judged at all, without the failed sensors."""
     for m in each("m", t.line_begin[k], t.line_begin[k + 1]):
         lost = let("lost", integer(0))

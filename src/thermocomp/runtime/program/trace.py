@@ -5,7 +5,7 @@ from contextvars import ContextVar
 from thermocomp.runtime.program.tree import Kind, Statement
 
 
-class Recording:
+class Trace:
     """The function that is being recorded."""
 
     def __init__(self) -> None:
@@ -13,9 +13,9 @@ class Recording:
         self.locals: dict[str, Kind] = {}
 
 
-RECORDING: ContextVar[Recording] = ContextVar("recording")
+TRACE: ContextVar[Trace] = ContextVar("recording")
 
 
 def add(statement: Statement) -> None:
     """Add a statement to the present block."""
-    RECORDING.get().blocks[-1].append(statement)
+    TRACE.get().blocks[-1].append(statement)
