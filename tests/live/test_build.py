@@ -69,7 +69,7 @@ def test_a_model_of_time_and_position_is_a_line(tmp_path: Path) -> None:
     ("text", "says"),
     [
         ("", "name at least one model file"),
-        ('models = ["drift.json"]\n[machine]\nfile = "mill.toml"\nat = [0.0, 0.0, 0.0]\n', "and not both"),
+        ('models = ["drift.json"]\n[machine]\nfile = "mill.toml"\nat = [0.0, 0.0, 0.0]\n', "but not both"),
         ('[machine]\nfile = "mill.toml"\nat = [0.0, 0.0]\n', "machine.at.3 is missing"),
     ],
 )

@@ -45,7 +45,8 @@ def contributions(
         if state.memory is None:
             parts.append(np.zeros(known))
         else:
-            parts.append(layers.advance(state.memory, model.change(state, last), 0.0)[1][..., -known:])
+            said = layers.advance(state.memory, model.change(state, last), 0.0)[1]
+            parts.append(said[len(said) - known :])
     found = np.array(parts, dtype=np.float64).reshape(len(parts), known)
     return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
 
