@@ -32,7 +32,7 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
         raise failure(f"{source}: no such {what}") from e
     except UnicodeDecodeError as e:
         found = f"it is not a text file ({e})"
-        raise failure(f"{source}: cannot be read as a {what}: {found}; give another file") from e
+        raise failure(f"{source}: cannot be read as a {what}: {found}; name a {what}") from e
     except OSError as e:
         raise failure(f"{source}: cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
