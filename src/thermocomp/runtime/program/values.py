@@ -1,10 +1,13 @@
 """Symbols of a program while it is recorded: numbers, integers, conditions and arrays that a type checker sees."""
 
-from typing import NoReturn, cast
+from abc import abstractmethod
+from typing import Any, Generic, NoReturn, Self, TypeVar, cast
 
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.trace import add
 from thermocomp.runtime.program.tree import Expression, Kind, Operator
+
+P = TypeVar("P", int, float)
 
 
 class Symbol:
@@ -43,20 +46,61 @@ class Condition(Symbol):
         self._assign(flag(value).node)
 
 
-class Whole(Symbol):
-    """An integer."""
+class Ordered(Symbol, Generic[P]):
+    """A number or an integer, and what both can do; a plain number is made an expression."""
 
-    def _with(self, operator: Operator, other: "Whole | int") -> "Whole":
-        return Whole(n.Operation("int", operator, self.node, integer(other).node))
+    @staticmethod
+    @abstractmethod
+    def _made(value: Any) -> Symbol:
+        """Return a value as an expression."""
 
-    def __add__(self, other: "Whole | int") -> "Whole":
+    def _with(self, operator: Operator, other: Self | P, *, swapped: bool = False) -> Self:
+        one, two = (self._made(other), self) if swapped else (self, self._made(other))
+        return type(self)(n.Operation(common_kind(one, two), operator, one.node, two.node))
+
+    def __add__(self, other: Self | P) -> Self:
         return self._with("+", other)
 
-    def __sub__(self, other: "Whole | int") -> "Whole":
+    def __sub__(self, other: Self | P) -> Self:
         return self._with("-", other)
 
-    def __mul__(self, other: "Whole | int") -> "Whole":
+    def __mul__(self, other: Self | P) -> Self:
         return self._with("*", other)
+
+    def _compared(self, operator: Operator, other: Self | P) -> Condition:
+        return Condition(n.Operation("bool", operator, self.node, self._made(other).node))
+
+    def __lt__(self, other: Self | P) -> Condition:
+        return self._compared("<", other)
+
+    def __le__(self, other: Self | P) -> Condition:
+        return self._compared("<=", other)
+
+    def __gt__(self, other: Self | P) -> Condition:
+        return self._compared(">", other)
+
+    def __ge__(self, other: Self | P) -> Condition:
+        return self._compared(">=", other)
+
+    def equals(self, other: Self | P) -> Condition:
+        """Return the condition that both are equal."""
+        return self._compared("==", other)
+
+    def differs(self, other: Self | P) -> Condition:
+        """Return the condition that the two are not equal."""
+        return self._compared("!=", other)
+
+    def set(self, value: Self | P) -> None:
+        """Assign a value to this variable."""
+        self._assign(self._made(value).node)
+
+
+class Whole(Ordered[int]):
+    """An integer."""
+
+    @staticmethod
+    def _made(value: "Whole | int") -> "Whole":
+        return integer(value)
 
     def __floordiv__(self, other: "Whole | int") -> "Whole":
         return self._with("//", other)
@@ -64,61 +108,24 @@ class Whole(Symbol):
     def __mod__(self, other: "Whole | int") -> "Whole":
         return self._with("%", other)
 
-    def _compared(self, operator: Operator, other: "Whole | int") -> Condition:
-        return Condition(n.Operation("bool", operator, self.node, integer(other).node))
-
-    def __lt__(self, other: "Whole | int") -> Condition:
-        return self._compared("<", other)
-
-    def __le__(self, other: "Whole | int") -> Condition:
-        return self._compared("<=", other)
-
-    def __gt__(self, other: "Whole | int") -> Condition:
-        return self._compared(">", other)
-
-    def __ge__(self, other: "Whole | int") -> Condition:
-        return self._compared(">=", other)
-
-    def equals(self, other: "Whole | int") -> Condition:
-        """Return the condition that both are equal."""
-        return self._compared("==", other)
-
-    def differs(self, other: "Whole | int") -> Condition:
-        """Return the condition that the two are not equal."""
-        return self._compared("!=", other)
-
     @property
     def real(self) -> "Number":
         """The same as a real number."""
         return Number(n.Real("real", self.node))
 
-    def set(self, value: "Whole | int") -> None:
-        """Assign a value to this variable."""
-        self._assign(integer(value).node)
 
-
-class Number(Symbol):
+class Number(Ordered[float]):
     """A real number, or a time: the result of an operation with a time is a time, in double precision."""
 
-    def _with(self, operator: Operator, other: "Number | float", *, swapped: bool = False) -> "Number":
-        pair = (self, real(other))
-        left, right = reversed(pair) if swapped else pair
-        return Number(n.Operation(common_kind(*pair), operator, left.node, right.node))
-
-    def __add__(self, other: "Number | float") -> "Number":
-        return self._with("+", other)
+    @staticmethod
+    def _made(value: "Number | float") -> "Number":
+        return real(value)
 
     def __radd__(self, other: float) -> "Number":
         return self._with("+", other, swapped=True)
 
-    def __sub__(self, other: "Number | float") -> "Number":
-        return self._with("-", other)
-
     def __rsub__(self, other: float) -> "Number":
         return self._with("-", other, swapped=True)
-
-    def __mul__(self, other: "Number | float") -> "Number":
-        return self._with("*", other)
 
     def __rmul__(self, other: float) -> "Number":
         return self._with("*", other, swapped=True)
@@ -134,33 +141,6 @@ class Number(Symbol):
 
     def __abs__(self) -> "Number":
         return Number(n.Call(self.node.kind, "abs", (self.node,)))
-
-    def _compared(self, operator: Operator, other: "Number | float") -> Condition:
-        return Condition(n.Operation("bool", operator, self.node, real(other).node))
-
-    def __lt__(self, other: "Number | float") -> Condition:
-        return self._compared("<", other)
-
-    def __le__(self, other: "Number | float") -> Condition:
-        return self._compared("<=", other)
-
-    def __gt__(self, other: "Number | float") -> Condition:
-        return self._compared(">", other)
-
-    def __ge__(self, other: "Number | float") -> Condition:
-        return self._compared(">=", other)
-
-    def equals(self, other: "Number | float") -> Condition:
-        """Return the condition that both are equal."""
-        return self._compared("==", other)
-
-    def differs(self, other: "Number | float") -> Condition:
-        """Return the condition that the two are not equal."""
-        return self._compared("!=", other)
-
-    def set(self, value: "Number | float") -> None:
-        """Assign a value to this variable."""
-        self._assign(real(value).node)
 
 
 def flag(value: Condition | bool) -> Condition:
@@ -178,9 +158,10 @@ def real(value: Number | float) -> Number:
     return value if isinstance(value, Number) else Number(n.Numeral("real", float(value)))
 
 
-def common_kind(*values: Number) -> Kind:
+def common_kind(*values: Symbol) -> Kind:
     """Return the kind of the result of an operation: ``time`` if an operand is a time."""
-    return "time" if any(v.node.kind == "time" for v in values) else "real"
+    kinds = {v.node.kind for v in values}
+    return "time" if "time" in kinds else "real" if "real" in kinds else "int"
 
 
 Index = Whole | int | tuple[Whole | int, ...]
