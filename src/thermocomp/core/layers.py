@@ -15,66 +15,11 @@ from thermocomp.core import expression as e
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.forms import Form, Forms, add_forms
 from thermocomp.core.recurrences import Clock
 from thermocomp.core.ticker import Ticker
 
 IntArray = NDArray[np.intp]
-
-
-class Form(NamedTuple):
-    """A linear form: constant + sum of weight * value."""
-
-    weights: tuple[tuple[int, float], ...]  #: by slot
-    constant: float
-
-    def scaled(self, factor: float) -> "Form":
-        """Return the form multiplied by a number."""
-        return Form(tuple((k, factor * w) for k, w in self.weights), factor * self.constant)
-
-
-def _added(forms: Sequence[Form]) -> Form:
-    weights: dict[int, float] = {}
-    for form in forms:
-        for k, w in form.weights:
-            weights[k] = weights.get(k, 0.0) + w
-    return Form(tuple(weights.items()), sum(f.constant for f in forms))
-
-
-class Forms:
-    """Several linear forms of values.
-
-    Parameters
-    ----------
-    forms : sequence of Form
-    exact : bool
-        Each reading of a batch gives the same as alone to the last bit, which a matrix product does not.
-    """
-
-    def __init__(self, forms: Sequence[Form], exact: bool = False) -> None:
-        self._exact = exact
-        self._single = all(len(f.weights) == 1 for f in forms)
-        self._constant = np.array([f.constant for f in forms], dtype=np.float64)
-        self._any_constant = bool(self._constant.any())
-        if self._single:
-            self._slots = np.array([f.weights[0][0] for f in forms], dtype=np.intp)
-            self._weights = np.array([f.weights[0][1] for f in forms], dtype=np.float64)
-            self._scales = bool((self._weights != 1.0).any())
-            return
-        used = sorted({k for f in forms for k, _ in f.weights})
-        self._slots = np.array(used, dtype=np.intp)
-        self._weights = np.zeros((len(used), len(forms)))
-        for j, form in enumerate(forms):
-            for k, w in form.weights:
-                self._weights[used.index(k), j] = w
-
-    def evaluate(self, values: FloatArray) -> FloatArray:
-        """Return the forms, (..., n_forms), of values, (..., n_slots)."""
-        found = values.take(self._slots, axis=-1)
-        if not self._single:
-            found = (found[..., None] * self._weights).sum(axis=-2) if self._exact else found @ self._weights
-        elif self._scales:
-            found = found * self._weights
-        return found + self._constant if self._any_constant else found
 
 
 class _Layer(NamedTuple):
@@ -146,7 +91,7 @@ class Layers:
         places, self._layers, self.n_memory = builder.lay()
         #: nodes with a memory, in its order
         self.remembered = builder.remembered
-        self._forms = [_moved(f, places) for f in forms]
+        self._forms = [f.moved(places) for f in forms]
         self._outputs = Forms(self._forms, builder.exact)
         self._n = n_inputs + len(places)
 
@@ -217,11 +162,6 @@ class Layers:
         return values
 
 
-def _moved(form: Form, places: Sequence[int]) -> Form:
-    """Return a form with each slot at its place."""
-    return Form(tuple((places[k], w) for k, w in form.weights), form.constant)
-
-
 class _Builder:
     """Values of expressions, each once, and their order."""
 
@@ -247,9 +187,9 @@ class _Builder:
             case e.Named(_, of):
                 return self.form(of)
             case e.Sum(terms):
-                return _added([self.form(t) for t in terms])
+                return add_forms([self.form(t) for t in terms])
             case e.Difference(of, minus):
-                return _added([self.form(of), self.form(minus).scaled(-1.0)])
+                return add_forms([self.form(of), self.form(minus).scaled(-1.0)])
             case e.Product(factors):
                 forms = [self.form(f) for f in factors]
                 factor = float(np.prod([f.constant for f in forms if not f.weights]))
@@ -334,12 +274,12 @@ class _Builder:
             own = slice(first, first + len(members))
             if (ticker := tickers.get(members[0])) is not None:
                 (slot,) = members
-                inputs = Forms([_moved(f, places) for f in slot.operands], self.exact)
+                inputs = Forms([f.moved(places) for f in slot.operands], self.exact)
                 memory = slice(begin_of[slot], begin_of[slot] + ticker.n_memory)
                 layers.append(_Ticks(own, memory, inputs, ticker))
                 continue
             operands = tuple(
-                Forms([_moved(f, places) for f in column], self.exact)
+                Forms([f.moved(places) for f in column], self.exact)
                 for column in zip(*(s.operands for s in members), strict=True)
             )
             numbers = np.array([s.numbers for s in members]).T

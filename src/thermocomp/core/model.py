@@ -6,7 +6,7 @@ and returns the next one.
 """
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -22,6 +22,7 @@ from thermocomp.core.exceptions import InputError, ReadingError, SettingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.family import ModelFamily
+from thermocomp.core.gated import Gated
 from thermocomp.core.inputs import Input, Support, TrainedRange
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.layers import Layers
@@ -36,7 +37,7 @@ _UNIT = re.compile(r"(um|urad)(/m(\^[2-9])?)?")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ErrorModel(ModelFamily):
+class ErrorModel(Gated, ModelFamily):
     """Frozen model of one error component.
 
     Parameters
@@ -104,18 +105,6 @@ class ErrorModel(ModelFamily):
         if self.band is not None and max(self.band.speeds, default=-1) >= len(names):
             raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
         self._check()
-
-    def may_lose(self, names: Collection[str]) -> bool:
-        """Return whether the model is better than no compensation without these inputs: see `HonestError.may_lose`."""
-        return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
-
-    def widening(self, names: Collection[str]) -> float:
-        """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
-        return 1.0 if self.honest_error is None else self.honest_error.widening(self._named(names))
-
-    def _named(self, names: Collection[str]) -> list[str]:
-        """Return those names that are inputs, in their order."""
-        return [i.name for i in self.inputs if i.name in names]
 
     # -- evaluation ---------------------------------------------------------------------------------------------------
 
@@ -369,11 +358,6 @@ class ErrorModel(ModelFamily):
         """Return the model as one line of text."""
         return format_node(self.expression())
 
-    @property
-    def accepted(self) -> bool:
-        """True if the do-no-harm gate accepted this model."""
-        return self.honest_error is not None and self.honest_error.word == "accepted"
-
     def taken(self, by: str | None) -> Self:
         """Return this model with the approval of a person if it is unproven; else unchanged.
 
@@ -393,23 +377,6 @@ class ErrorModel(ModelFamily):
         if found is None or found.word != "unproven":
             return self
         return replace(self, honest_error=replace(found, taken=taken))
-
-    def check_may_run(self) -> None:
-        """Reject a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
-
-        Raises
-        ------
-        InputError
-            The model was never judged, was judged by other rules than the current ones, was refused, or is unproven and
-            not approved.
-        """
-        found = self.honest_error
-        if found is None:
-            raise InputError(
-                f"model of {self.target} was never judged on unseen cycles and will not run: 'thermocomp fit' judges "
-                "the models that it fits; a model fitted in another way can be compared and assessed"
-            )
-        found.check_may_run(self.target)
 
 
 def _bounded(inputs: FloatArray) -> FloatArray:

@@ -1,0 +1,49 @@
+"""What the do-no-harm gate permits of a model."""
+
+from collections.abc import Collection
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Input
+from thermocomp.core.provenance import HonestError
+
+
+class Gated:
+    """A model with its error on unseen cycles."""
+
+    target: str
+    inputs: tuple[Input, ...]
+    honest_error: HonestError | None
+
+    @property
+    def accepted(self) -> bool:
+        """True if the do-no-harm gate accepted this model."""
+        return self.honest_error is not None and self.honest_error.word == "accepted"
+
+    def may_lose(self, names: Collection[str]) -> bool:
+        """Return whether the model is better than no compensation without these inputs: see `HonestError.may_lose`."""
+        return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
+
+    def widening(self, names: Collection[str]) -> float:
+        """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
+        return 1.0 if self.honest_error is None else self.honest_error.widening(self._named(names))
+
+    def _named(self, names: Collection[str]) -> list[str]:
+        """Return those names that are inputs, in their order."""
+        return [i.name for i in self.inputs if i.name in names]
+
+    def check_may_run(self) -> None:
+        """Reject a model that the do-no-harm gate did not accept, unless a person approved it as unproven.
+
+        Raises
+        ------
+        InputError
+            The model was never judged, was judged by other rules than the current ones, was refused, or is unproven and
+            not approved.
+        """
+        found = self.honest_error
+        if found is None:
+            raise InputError(
+                f"model of {self.target} was never judged on unseen cycles and will not run: 'thermocomp fit' judges "
+                "the models that it fits; a model fitted in another way can be compared and assessed"
+            )
+        found.check_may_run(self.target)
