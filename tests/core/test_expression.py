@@ -1,5 +1,6 @@
 """The tree of a model says what the model says: for every family, in any run of readings."""
 
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -36,6 +37,17 @@ def test_the_tree_is_the_model(family: str, data: st.DataObject, rows: list[tupl
         state, expected = model.step(state, np.array(values), dt)
         found = tree.step(values, dt)
         assert found == pytest.approx(float(expected), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(data=st.data())
+def test_a_model_that_has_run_can_be_sent_to_another_process(family: str, data: st.DataObject) -> None:
+    model: ErrorModel = data.draw(FAMILIES[family])
+    reading = np.array([25.0, 22.0, 2500.0])
+    state, _ = model.step(model.init(np.zeros(3)), reading, 0.0)
+    sent = pickle.loads(pickle.dumps(model))
+    assert sent == model
+    assert sent.step(state, reading, 10.0)[1] == model.step(state, reading, 10.0)[1]
 
 
 @given(curve=CURVES, at=st.floats(-12, 12))

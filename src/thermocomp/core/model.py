@@ -7,7 +7,7 @@ and returns the next one.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Self
 
@@ -105,6 +105,10 @@ class ErrorModel(Gated, ModelFamily):
         if self.band is not None and max(self.band.speeds, default=-1) >= len(names):
             raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
         self._check()
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return the numbers alone for a pickle; what is derived from them is derived again."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     # -- evaluation ---------------------------------------------------------------------------------------------------
 
