@@ -1,6 +1,8 @@
 """The watch as machine code of the program finds what the watch in numpy finds."""
 
+from collections.abc import Callable
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -10,12 +12,17 @@ from watchedmachine import failing
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.watch import Watch
+from thermocomp.judging import watchrun
+from thermocomp.judging.compiled.machine import run
 from thermocomp.judging.watchrun import run_watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
+from thermocomp.runtime.program.memory import FlatMemory
 from thermocomp.runtime.watch import begin, look
+from thermocomp.virtual import datasets as virtual
 
+SIX = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")
 #: values that no sensor of a healthy machine reads
 STRANGE = (np.nan, np.inf, -np.inf, 1e300, -273.15, 0.0, 1e5, 85.0)
 
@@ -28,15 +35,42 @@ def watched() -> tuple[Watch, Samples]:
     return watch, samples
 
 
-def check(time: FloatArray, values: FloatArray, resting: np.ndarray, zero: FloatArray | None) -> np.ndarray:
+@cache
+def six() -> tuple[Watch, Samples]:
+    """Return six temperatures of the virtual machine: enough for swaps to be told from single failures."""
+    whole = stack(virtual.record("demo"), ["z_um"])
+    samples = whole.take(np.arange(len(whole)) % 3 == 0).only([*SIX, "spindle_rpm"])
+    watch = find_watch(samples, samples.cycle != 3)
+    assert watch is not None
+    return watch, samples
+
+
+def check(
+    time: FloatArray, values: FloatArray, resting: np.ndarray, zero: FloatArray | None, watch: Watch | None = None
+) -> np.ndarray:
     """Compare both over the same readings; return the faults."""
-    watch, _ = watched()
+    watch = watch or watched()[0]
     state = begin(watch, zero)
-    passed, faults = run_watch(watch, time, values, resting, zero)
+    memories: list[FlatMemory] = []
+
+    def kept(procedure: Callable[..., None], memory: FlatMemory) -> None:
+        memories.append(memory)
+        run(procedure, memory)
+
+    with patch.object(watchrun, "run", kept):
+        passed, faults = run_watch(watch, time, values, resting, zero)
     for row, now in enumerate(time.tolist()):
         state, believed = look(watch, state, now, values[row], resting=bool(resting[row]))
         assert faults[row].tolist() == state.fault.tolist(), row
         np.testing.assert_allclose(passed[row], believed, rtol=1e-12, atol=1e-12)
+    if not np.isnan(state.time):  # what later decisions rest on
+        (memory,) = memories
+        for name in ("predicted", "usual", "memory", "traces"):
+            np.testing.assert_allclose(memory.find("s", name), getattr(state, name), rtol=1e-10, atol=1e-10)
+        cleared = memory.find("s", "cleared") != 0
+        assert cleared.tolist() == np.isneginf(state.evidence).tolist()
+        found = memory.find("s", "evidence")[~cleared]
+        np.testing.assert_allclose(found, state.evidence[~cleared], rtol=1e-9, atol=1e-9)
     return faults
 
 
@@ -55,6 +89,32 @@ def test_planted_failures_are_found_alike(known: str) -> None:
     values[150:, heat[2]] = values[150, heat[2]]
     faults = check(time, values, resting, zero)
     assert {1, 2} <= set(np.unique(faults).tolist())
+
+
+@pytest.mark.parametrize("kind", ["slow", "swapped", "gone", "stuck", "none"])
+@pytest.mark.parametrize("begin_at", [950, 1100])
+def test_failures_of_a_day_are_found_alike(kind: str, begin_at: int) -> None:
+    watch, samples = six()
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]].copy()
+    one, other = watch.bank.temperatures[:2].tolist()
+    later = slice(begin_at, None)
+    if kind == "slow":
+        values[later, one] += np.minimum(np.arange(len(values) - begin_at) * 0.02, 4.0)
+    elif kind == "swapped":
+        values[later, [one, other]] = values[later][:, [other, one]]
+    elif kind == "gone":
+        values[begin_at : begin_at + 90, one] = np.nan
+    elif kind == "stuck":
+        values[later, one] = values[begin_at, one]
+    faults = check(samples.time, values, samples.stands, None, watch)
+    assert faults.any() == (kind != "none")
+
+
+@pytest.mark.parametrize("rows", range(4, 100, 6))
+def test_what_is_kept_after_the_first_readings_is_alike(rows: int) -> None:
+    watch, samples = six()
+    places = [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]
+    check(samples.time[:rows], samples.values[:rows, places], samples.stands[:rows], None, watch)
 
 
 @given(st.data())
