@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from thermocomp.core.additive import Additive
 from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.state import State
 from thermocomp.models.unfrozen import EstimatorModel
 
 
@@ -37,6 +39,49 @@ def test_the_tree_is_the_model(family: str, data: st.DataObject, rows: list[tupl
         state, expected = model.step(state, np.array(values), dt)
         found = tree.step(values, dt)
         assert found == pytest.approx(float(expected), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(
+    data=st.data(),
+    rows=READINGS,
+    policy=st.sampled_from(["clip", "hold", "fade"]),
+    margin=st.floats(0.0, 0.3),
+    cut=st.integers(1, 8),
+    variants=st.integers(0, 3),
+    block=st.integers(1, 200),
+)
+def test_a_run_is_its_steps(
+    family: str,
+    data: st.DataObject,
+    rows: list[tuple[float, ...]],
+    policy: Any,
+    margin: float,
+    cut: int,
+    variants: int,
+    block: int,
+) -> None:
+    """In one run or in two, of one reading at a time or of several variants, in blocks of any size."""
+    model: ErrorModel = data.draw(FAMILIES[family])
+    model = replace(model, support=Support(policy, margin, 0.5))
+    table, steps = np.array([r[:-1] for r in rows]), np.array([r[-1] for r in rows])
+    if variants:
+        table = table[:, None] + 0.3 * np.arange(variants)[:, None]
+    state, expected = model.init(), list[State]()
+    for values, dt in zip(table, steps.tolist(), strict=True):
+        state, _ = model.step(state, values, dt)
+        expected.append(state)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("thermocomp.core.layers.BLOCK", block)
+        runs = [model.run(model.init(), table[:cut], steps[:cut])]
+        if len(rows) > cut:
+            runs.append(model.run(runs[0].state, table[cut:], steps[cut:]))
+    near = {"rtol": 1e-9, "atol": 1e-9}
+    np.testing.assert_allclose(np.concatenate([r.deviation for r in runs]), [s.deviation for s in expected], **near)
+    np.testing.assert_array_equal(np.concatenate([r.outside for r in runs]), [s.outside for s in expected])
+    assert state.memory is not None
+    np.testing.assert_allclose(runs[-1].state.memory, state.memory, **near)
+    np.testing.assert_array_equal(runs[-1].state.reference, state.reference)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

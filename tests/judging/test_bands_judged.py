@@ -59,7 +59,7 @@ def test_a_replay_gives_the_half_width_of_each_step() -> None:
     state = MODEL.init()
     for k, row in enumerate(ROWS):
         state, _ = MODEL.step(state, row, 60.0)
-        assert found.half_width[k] == MODEL.half_width(state, row)
+        assert found.half_width[k] == pytest.approx(MODEL.half_width(state, row), rel=1e-12)
     assert np.isnan(batch.run(replace(MODEL, band=None), None, TIME, ROWS).half_width).all()
 
 

@@ -156,7 +156,7 @@ def test_replay_is_what_the_compensator_commands(samples: Samples) -> None:
         reading = Reading(samples.time[k], dict(zip(names, samples.values[k], strict=True)))
         state, result = compensator.step(state, reading, reading.time)
         if k:
-            assert result.corrections["z_um"].offset == -predicted[k]
+            assert result.corrections["z_um"].offset == pytest.approx(-predicted[k], rel=1e-12, abs=1e-12)
 
 
 def test_judged_is_what_would_run(recording: Recording, samples: Samples) -> None:

@@ -13,7 +13,7 @@ from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.expression import Node, Sum, walk_nodes
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
-from thermocomp.core.rows import walk
+from thermocomp.core.rows import run_table
 
 
 class Gain(NamedTuple):
@@ -38,17 +38,12 @@ def contributions(
     dict of str to ndarray of shape (n_rows,)
         By input name [unit of the model]; 0 before the first complete row of a test.
     """
-    layers = model.layers_with(_parts(model))
-    known = len(model.inputs)
-    parts = []
-    for state, last in walk(model, table, time, reference=reference):
-        if state.memory is None:
-            parts.append(np.zeros(known))
-        else:
-            said = layers.advance(state.memory, model.change(state, last), 0.0)[1]
-            parts.append(said[len(said) - known :])
-    found = np.array(parts, dtype=np.float64).reshape(len(parts), known)
-    return {i.name: column for i, column in zip(model.inputs, found.T, strict=True)}
+    run = run_table(model, table, time, reference=reference, further=_parts(model))
+
+    def own(k: int) -> FloatArray:
+        return run.spread(lambda r: r.outputs[:, k - len(model.inputs)], 0.0)
+
+    return {i.name: own(k) for k, i in enumerate(model.inputs)}
 
 
 def _parts(model: ErrorModel) -> list[Node]:

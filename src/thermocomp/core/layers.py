@@ -21,6 +21,9 @@ from thermocomp.core.ticker import Ticker
 
 IntArray = NDArray[np.intp]
 
+#: number of values computed at once: they fit into the cache of a processor
+BLOCK = 2**17
+
 
 class _Layer(NamedTuple):
     """Values in adjacent slots, computed by one operation on the values of each operand."""
@@ -28,6 +31,14 @@ class _Layer(NamedTuple):
     slots: slice
     operands: tuple[Forms, ...]
     work: Callable[..., FloatArray]
+
+    def advance(self, values: FloatArray, _memory: FloatArray, _dt: float) -> None:
+        """Compute the values."""
+        values[..., self.slots] = self.work(*(f.evaluate(values) for f in self.operands))
+
+    def follow(self, values: FloatArray, memory: FloatArray, _steps: FloatArray) -> None:
+        """Compute the values of several readings, (n_readings, ..., n_slots)."""
+        self.advance(values, memory, 0.0)
 
 
 class _Lags(NamedTuple):
@@ -40,6 +51,30 @@ class _Lags(NamedTuple):
     gain: FloatArray  #: [1/s]
     paces: Forms | None
 
+    def advance(self, values: FloatArray, memory: FloatArray, dt: float) -> None:
+        """Move the lags towards their signals in the time `dt`; infinite: to the steady state."""
+        signals = self.signals.evaluate(values)
+        if dt == np.inf:
+            memory[..., self.memory] = signals
+        else:
+            held = memory[..., self.memory]
+            signals -= held
+            signals *= np.expm1(-dt * self._rates(values))
+            memory[..., self.memory] = held - signals
+        values[..., self.slots] = memory[..., self.memory]
+
+    def follow(self, values: FloatArray, memory: FloatArray, steps: FloatArray) -> None:
+        """Move the lags through several readings, (n_readings, ..., n_slots)."""
+        signals = self.signals.evaluate(values)
+        shares = np.expm1(-steps.reshape(-1, *[1] * (values.ndim - 1)) * self._rates(values))
+        held, found = memory[..., self.memory], values[..., self.slots]
+        for k, (signal, share) in enumerate(zip(signals, shares, strict=True)):
+            held = found[k] = held - (signal - held) * share
+        memory[..., self.memory] = held
+
+    def _rates(self, values: FloatArray) -> FloatArray:
+        return self.rest if self.paces is None else self.rest + self.paces.evaluate(values) * self.gain
+
 
 class _Ticks(NamedTuple):
     """A value with a clock of its own."""
@@ -48,6 +83,21 @@ class _Ticks(NamedTuple):
     memory: slice
     inputs: Forms
     ticker: Ticker
+
+    def advance(self, values: FloatArray, memory: FloatArray, dt: float) -> None:
+        """Make the ticks that are due; an infinite time: begin."""
+        inputs = self.inputs.evaluate(values)
+        if dt == np.inf:
+            memory[..., self.memory] = self.ticker.begin(inputs)
+            values[..., self.slots.start] = 0.0
+        else:
+            own, values[..., self.slots.start] = self.ticker.advance(memory[..., self.memory], inputs, dt)
+            memory[..., self.memory] = own
+
+    def follow(self, values: FloatArray, memory: FloatArray, steps: FloatArray) -> None:
+        """Make the ticks of several readings, (n_readings, ..., n_slots)."""
+        for reading, dt in zip(values, steps.tolist(), strict=True):
+            self.advance(reading, memory, dt)
 
 
 @dataclass(frozen=True)
@@ -132,33 +182,39 @@ class Layers:
         memory = memory.copy()
         return memory, self._outputs.evaluate(self._run(memory, change, dt))
 
+    def run(self, memory: FloatArray, changes: FloatArray, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Advance the memory through readings, one after another; `advance` with the loop over time inside the layers.
+
+        Parameters
+        ----------
+        memory : ndarray of shape (..., n_memory)
+        changes : ndarray of shape (n_readings, ..., n_inputs)
+        steps : ndarray of shape (n_readings,)
+            Time since the previous reading [s].
+
+        Returns
+        -------
+        memory : ndarray of shape (..., n_memory)
+            After the last reading.
+        outputs : ndarray of shape (n_readings, ..., n_outputs)
+        """
+        memory, found = memory.copy(), np.empty((*changes.shape[:-1], len(self._forms)))
+        each = max(1, BLOCK // max(1, int(np.prod(changes.shape[1:-1])) * self._n))
+        for k in range(0, len(changes), each):
+            part = changes[k : k + each]
+            values = np.empty((*part.shape[:-1], self._n))
+            values[..., : self.n_inputs] = part
+            for layer in self._layers:
+                layer.follow(values, memory, steps[k : k + each])
+            found[k : k + each] = self._outputs.evaluate(values)
+        return memory, found
+
     def _run(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
         """Advance `memory` in place; return the values of all slots."""
         values = np.empty((*change.shape[:-1], self._n))
         values[..., : self.n_inputs] = change
         for layer in self._layers:
-            if isinstance(layer, _Layer):
-                values[..., layer.slots] = layer.work(*(f.evaluate(values) for f in layer.operands))
-                continue
-            if isinstance(layer, _Ticks):
-                inputs = layer.inputs.evaluate(values)
-                if dt == np.inf:
-                    memory[..., layer.memory] = layer.ticker.begin(inputs)
-                else:
-                    memory[..., layer.memory], values[..., layer.slots.start] = layer.ticker.advance(
-                        memory[..., layer.memory], inputs, dt
-                    )
-                continue
-            signals = layer.signals.evaluate(values)
-            if dt == np.inf:
-                memory[..., layer.memory] = signals
-            else:
-                held = memory[..., layer.memory]
-                rates = layer.rest if layer.paces is None else layer.rest + layer.paces.evaluate(values) * layer.gain
-                signals -= held
-                signals *= np.expm1(-dt * rates)
-                memory[..., layer.memory] = held - signals
-            values[..., layer.slots] = memory[..., layer.memory]
+            layer.advance(values, memory, dt)
         return values
 
 

@@ -1,21 +1,22 @@
 """Replay of a model through the rows of a table."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.columns import Columns, count_rows, read_clock, read_numbers
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.expression import Node
 from thermocomp.core.inputs import Input
-from thermocomp.core.state import State
+from thermocomp.core.state import Run, State
 from thermocomp.core.zero import Zeroing, find_zero
 
 
-class Stepped(Protocol):
+class Runs(Protocol):
     """Interface of a model for a replay; see `thermocomp.core.model.ErrorModel`."""
 
     @property
@@ -37,20 +38,31 @@ class Stepped(Protocol):
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed."""
 
-    def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:
-        """Process one reading and return the deviation at its time."""
+    def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> Run:
+        """Process readings one after another."""
 
 
-def walk(
-    model: Stepped, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
-) -> Iterator[tuple[State, FloatArray]]:
-    """Replay a model through a table as `ErrorModel.predict` does, and yield its state after each row.
+class TableRun(NamedTuple):
+    """Runs of a model through the tests of a table."""
 
-    Yields
-    ------
-    values : ndarray of shape (n_inputs,)
-        Last complete reading [units of the inputs]; NaN before the first.
-    """
+    runs: list[Run]
+    places: NDArray[np.intp]  #: (n_rows,), last complete reading of the test, over all runs; -1: none yet
+
+    def spread(self, value: Callable[[Run], FloatArray], before: float) -> FloatArray:
+        """Return a value of each reading for the rows; `before` the first complete reading of a test."""
+        known = np.concatenate([np.empty(0), *(value(run) for run in self.runs)])
+        return np.append(known, before)[self.places]
+
+
+def run_table(
+    model: Runs,
+    table: Columns,
+    time: ArrayLike | str | None = None,
+    *,
+    reference: ArrayLike | None = None,
+    further: Sequence[Node] = (),
+) -> TableRun:
+    """Run a model through a table as `ErrorModel.predict` does."""
     columns = [read_numbers(table, i.name, f"model of {model.target}") for i in model.inputs]
     clock = read_clock(table, time, f"model of {model.target}", needed=model.remembers)
     n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
@@ -67,20 +79,19 @@ def walk(
     if model.zeroing.speed in table:
         speed = read_numbers(table, model.zeroing.speed, f"model of {model.target}")
         resting = np.array([model.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
-    zeros: dict[int, ArrayLike | None] = {0: reference}
+    runs, places, done = list[Run](), np.full(n, -1), 0
     for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
-        zeros[a] = reference
-        if clock is not None and usable[a:b].any():
-            zeros[a], values[a:b] = find_zero(
-                model.zeroing, model.init(reference).reference, clock[a:b], values[a:b], resting[a:b], usable[a:b]
+        own, rows = slice(a, b), a + np.flatnonzero(usable[a:b])
+        if not rows.size:
+            continue
+        zero, since = reference, rows.astype(np.float64)
+        if clock is not None:
+            since = clock[rows]
+            zero, values[own] = find_zero(
+                model.zeroing, model.init(reference).reference, clock[own], values[own], resting[own], usable[own]
             )
-    state, since, last = model.init(reference), 0.0, np.full(len(columns), np.nan)
-    for k in range(n):
-        if k in zeros:
-            state, since = model.init(zeros[k]), 0.0
-        else:
-            since += float(steps[k]) if np.isfinite(steps[k]) else 0.0
-        if usable[k]:
-            state, _ = model.step(state, values[k], since)
-            since, last = 0.0, values[k]
-        yield state, last
+        runs.append(model.run(model.init(zero), values[rows], np.diff(since, prepend=since[0]), further))
+        places[rows] = done + np.arange(len(rows))
+        places[own] = np.maximum.accumulate(places[own])
+        done += len(rows)
+    return TableRun(runs, places)

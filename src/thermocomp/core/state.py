@@ -15,3 +15,13 @@ class State(NamedTuple):
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
     deviation: FloatArray  #: (...,), last deviation returned
     outside: BoolArray  #: (..., n_inputs), inputs beyond the trained range
+
+
+class Run(NamedTuple):
+    """Answers of a model to readings, one after another; further axes are a batch of independent runs."""
+
+    state: State  #: after the last reading
+    deviation: FloatArray  #: (n_readings, ...) [unit]
+    outside: BoolArray  #: (n_readings, ..., n_inputs), inputs beyond the trained range
+    change: FloatArray  #: (n_readings, ..., n_inputs), minus the reference, clipped to the trained range
+    outputs: FloatArray  #: (n_readings, ..., n_outputs), deviation at `change`, spread, further expressions

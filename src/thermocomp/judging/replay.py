@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.state import State
 from thermocomp.core.zero import Zeroing, first_rows, robust_mean
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
@@ -19,9 +19,11 @@ from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
 from thermocomp.runtime import batch
 
-#: converts one reading (n_inputs,) to a batch of disturbed readings (n_variants, n_inputs); its other arguments are the
-#: row and the reference of the test
-Disturb = Callable[[int, FloatArray, FloatArray], FloatArray]
+#: converts readings (n_some, n_inputs) to batches of disturbed readings (n_some, n_variants, n_inputs); its other
+#: arguments are the numbers of the rows (n_some,) and the reference of the test (n_inputs,)
+Disturb = Callable[[NDArray[np.intp], FloatArray, FloatArray], FloatArray]
+#: disturbed readings of this many rows are held at once
+BLOCK = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,15 +152,22 @@ def replay(model: ErrorModel, samples: Samples, rows: BoolArray) -> tuple[FloatA
     outside : ndarray of bool of shape (n_wanted,)
         An input was outside the trained range.
     """
-    wanted = int(rows.sum())
-    predicted, beyond = np.empty(wanted), np.empty(wanted, dtype=np.bool_)
-    for k, state in enumerate(walk(model, samples, rows)):
-        predicted[k], beyond[k] = state.deviation, state.outside.any()
-    return predicted, beyond
+    walked = list(walk(model, samples, rows))
+    none = np.empty((0, len(model.inputs)), dtype=np.bool_)
+    beyond = np.concatenate([none, *(w.outside for w in walked)])
+    return np.concatenate([np.empty(0), *(w.deviation for w in walked)]), np.asarray(beyond.any(axis=1))
 
 
-def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[State]:
-    """Step a model through the tests that contain `rows`; yield its state at each requested row, in their order.
+class Walked(NamedTuple):
+    """Outputs of a model in some of the requested rows."""
+
+    rows: NDArray[np.intp]  #: (n_some,)
+    deviation: FloatArray  #: (n_some,) or (n_some, n_variants); (n_some, 1) before the first reading [unit]
+    outside: BoolArray  #: (n_some, n_inputs) or (n_some, n_variants, n_inputs)
+
+
+def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb | None = None) -> Iterator[Walked]:
+    """Run a model through the tests that contain `rows`; yield its outputs at the requested rows, in their order.
 
     The model runs continuously from the start of a test, or of the files that it continues from, as at the machine; its
     only inputs are those of `samples`, never a displacement. A row with a missing input is rejected by the gate, as
@@ -167,36 +176,70 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
     Parameters
     ----------
     rows : ndarray of bool of shape (n_rows,)
-        Rows whose state is requested.
+        Requested rows.
     """
     columns = _columns(model, samples)
-    values, reference = samples.values[:, columns], samples.reference()[:, columns]
-    usable = np.all(np.isfinite(values), axis=1)
+    usable = np.asarray(np.isfinite(samples.values[:, columns]).all(axis=1))
     for test in np.unique(samples.test[rows]):
         mine = rows_until(samples, rows, test, model.zeroing, columns)
         own = mine[mine >= anew] if (anew := samples.anew(test)) is not None else mine[:0]
         window = _window(model, samples, own[usable[own]])
-
-        def read(k: int, zero: FloatArray = reference[test]) -> FloatArray:
-            return values[k] if disturb is None else disturb(k, values[k], zero)
-
-        state, head = _begun(model, samples, mine[usable[mine]], samples.given_zero(test, columns), read)
-        last, waiting, there = samples.time[mine[0]], list[State](), list[FloatArray]()
+        wanted = rows.copy()
+        wanted[window] = True
+        waiting, there = list[Walked](), list[FloatArray]()
         shift: FloatArray | float | None = None if window.size else 0.0
-        for k, needed in zip(
-            mine.tolist(), _needed(model, usable[mine], rows[mine] | np.isin(mine, window)), strict=True
-        ):
-            if needed:
-                state, _ = model.step(state, head.pop(k) if k in head else read(k), float(samples.time[k] - last))
-                last = samples.time[k]
-            if shift is None and k in window:
-                there.append(state.deviation)
-                shift = np.mean(there, axis=0) if k == window[-1] else None
-            if rows[k]:
-                waiting.append(state)
+        for some in _walk_test(model, samples, mine, wanted, usable, disturb):
+            waiting.append(some)
+            if shift is None:
+                there += list(some.deviation[np.isin(some.rows, window)])
+                shift = np.mean(there, axis=0) if some.rows[-1] >= window[-1] else None
             if shift is not None:
-                yield from (s._replace(deviation=s.deviation - shift) for s in waiting)
+                for done in waiting:
+                    asked = rows[done.rows]
+                    yield Walked(done.rows[asked], done.deviation[asked] - shift, done.outside[asked])
                 waiting.clear()
+
+
+def _walk_test(
+    model: ErrorModel,
+    samples: Samples,
+    mine: NDArray[np.intp],
+    wanted: BoolArray,
+    usable: BoolArray,
+    disturb: Disturb | None,
+) -> Iterator[Walked]:
+    """Yield the outputs of a model at the wanted rows of a test, block by block."""
+    columns, test = _columns(model, samples), samples.test[mine[0]]
+    reference = samples.reference()[test, columns]
+
+    def read(at: NDArray[np.intp]) -> FloatArray:
+        values = samples.values[at][:, columns]
+        return values if disturb is None else disturb(at, values, reference)
+
+    state = model.init(samples.given_zero(test, columns))
+    head, mean = mine[:0], np.zeros(len(columns))
+    if np.isnan(state.reference).any():
+        head = _window(model, samples, mine[usable[mine]])
+    if head.size:
+        mean = robust_mean(read(head))
+        state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
+    stepped = mine[_needed(model, usable[mine], wanted[mine])]
+    asked = mine[wanted[mine]]
+    before = np.searchsorted(stepped, asked, side="right")  # readings up to each wanted row
+    steps = np.diff(samples.time[stepped], prepend=samples.time[mine[0]])
+    blank = asked[before == 0]  # held since the start
+    if blank.size:
+        shape = blank.shape if disturb is None else (len(blank), 1)
+        yield Walked(blank, np.zeros(shape), np.zeros((*shape, len(columns)), dtype=np.bool_))
+    size = len(stepped) if disturb is None else BLOCK
+    for k in range(0, len(stepped), max(size, 1)):
+        at = stepped[k : k + size]
+        later = read(at[~np.isin(at, head)])
+        values = np.concatenate([np.broadcast_to(mean, (len(at) - len(later), *later.shape[1:])), later])
+        ran = model.run(state, values, steps[k : k + size])
+        state, there = ran.state, (before > k) & (before <= k + size)
+        if there.any():
+            yield Walked(asked[there], ran.deviation[before[there] - 1 - k], ran.outside[before[there] - 1 - k])
 
 
 def are_absolute(models: Sequence[ErrorModel]) -> bool:
@@ -215,25 +258,6 @@ def stack_for(model: ErrorModel, recordings: Sequence[Recording], starts: Start 
         zeroing=model.zeroing,
         starts=starts,
     )
-
-
-def _begun(
-    model: ErrorModel,
-    samples: Samples,
-    readings: NDArray[np.intp],
-    reference: FloatArray | None,
-    read: Callable[[int], FloatArray],
-) -> tuple[State, dict[int, FloatArray]]:
-    """Return the initial state of a test with known zero, and the readings of the zero, replaced by their mean."""
-    state = model.init(reference)
-    if not np.isnan(state.reference).any():
-        return state, {}
-    head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
-    if head:
-        mean = robust_mean(list(head.values()))
-        state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
-        head = dict.fromkeys(head, mean)
-    return state, head
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:

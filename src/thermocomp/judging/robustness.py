@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
@@ -187,28 +188,28 @@ def stress(
         for names in lost
     ]
     rng = np.random.default_rng(0)
-    n_inputs = len(model.inputs)
 
-    def disturb(row: int, reading: FloatArray, reference: FloatArray) -> FloatArray:
-        batch = np.broadcast_to(reading, (1 + 2 * draws + len(lost), n_inputs)).copy()
-        batch[1 : 1 + draws, temperatures] += rng.uniform(-NOISE, NOISE, (draws, temperatures.sum()))
-        batch[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, NOISE, (draws, temperatures.sum()))
+    def disturb(rows: NDArray[np.intp], readings: FloatArray, reference: FloatArray) -> FloatArray:
+        batch = np.repeat(readings[:, None], 1 + 2 * draws + len(lost), axis=1)
+        for own in batch:  # a row after the other, so that the noise of a row does not depend on those after it
+            own[1 : 1 + draws, temperatures] += rng.uniform(-NOISE, NOISE, (draws, temperatures.sum()))
+            own[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, NOISE, (draws, temperatures.sum()))
         for variant, (places, through) in enumerate(zip(cut, let, strict=True), start=1 + 2 * draws):
             if guard and lost[variant - 1 - 2 * draws] in guard.readings:
                 for k, values in through.items():
-                    batch[variant, k] = values[row]
+                    batch[:, variant, k] = values[rows]
             else:
-                batch[variant, places] = reference[places]
+                batch[:, variant, places] = reference[places]
         return batch
 
     # sums instead of a table: a long recording times two hundred variants would not fit into memory
     predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
-    squares = np.zeros(1 + 2 * draws + len(lost))
-    for k, state in enumerate(walk(model, samples, rows, disturb)):
-        deviation = np.broadcast_to(state.deviation, squares.shape)
-        squares += (measured[k] - deviation) ** 2
-        predicted[k] = deviation[0]
-        beyond[k] = np.atleast_2d(state.outside)[0].any()
+    squares, done = np.zeros(1 + 2 * draws + len(lost)), 0
+    for some in walk(model, samples, rows, disturb):
+        part = slice(done, done + len(some.rows))
+        squares += ((measured[part, None] - some.deviation) ** 2).sum(axis=0)
+        predicted[part], beyond[part] = some.deviation[:, 0], some.outside[:, 0].any(axis=-1)
+        done = part.stop
     rms = np.sqrt(squares / len(measured))
     laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
     unlike = unlike_rows(model, samples, rows)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError, InputError
@@ -102,19 +103,17 @@ def _squares(
     temperatures = np.array([c.quantity == "temperature" for c in samples.inputs], dtype=np.bool_)
     # each row has its own error, whatever rows the model needs
     walked = np.isin(samples.test, samples.test[judged])
-    order = np.argsort(samples.test[walked], kind="stable")
-    row_numbers = np.flatnonzero(walked)[order]
 
-    def disturb(row: int, reading: FloatArray, _: FloatArray) -> FloatArray:
-        rng = np.random.default_rng((seed, row))
-        shape = (draws, len(samples.inputs))
-        error = rng.uniform(-size, size, shape) if law == "uniform" else rng.normal(0.0, size, shape)
-        batch = np.repeat(reading[None], 1 + draws, axis=0)
-        batch[1:] += (error * temperatures)[:, columns]
+    def disturb(rows: NDArray[np.intp], readings: FloatArray, _: FloatArray) -> FloatArray:
+        batch, shape = np.repeat(readings[:, None], 1 + draws, axis=1), (draws, len(samples.inputs))
+        for row, own in zip(rows.tolist(), batch, strict=True):
+            rng = np.random.default_rng((seed, row))
+            error = rng.uniform(-size, size, shape) if law == "uniform" else rng.normal(0.0, size, shape)
+            own[1:] += (error * temperatures)[:, columns]
         return batch
 
     squares = np.zeros(1 + draws)
-    for row, state in zip(row_numbers, walk(model, samples, walked, disturb), strict=True):
-        if judged[row]:
-            squares += (measured[row] - state.deviation) ** 2
+    for some in walk(model, samples, walked, disturb):
+        mine = judged[some.rows]
+        squares += ((measured[some.rows[mine], None] - some.deviation[mine]) ** 2).sum(axis=0)
     return squares

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -160,9 +159,7 @@ def train(
     fit = fit_method(name, samples, target, learn)
     how, estimator, seen, predicted = fit.how, fit.estimator, fit.seen, fit.predicted
     r_squared = float(r2_score(samples.deviations[seen, target], predicted[seen]))
-    freeze: Any = estimator.freeze
-    if isinstance(estimator, UnfrozenRegressor):
-        freeze = partial(estimator.unfrozen, rows=samples.change()[samples.valid][:, fit.columns])
+    freeze: Any = estimator.unfrozen if isinstance(estimator, UnfrozenRegressor) else estimator.freeze
     channel = samples.targets[target]
     model: ErrorModel = freeze(
         target=channel.name,

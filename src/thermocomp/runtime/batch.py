@@ -211,35 +211,25 @@ def _said(
     model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
 ) -> _Answers:
     """Return the output of the model per row; it is held at unused readings."""
-    rows = np.flatnonzero(used)
-    nothing = np.full(len(time), np.nan)
-    found = _Answers(np.zeros(len(time)), np.zeros(len(time), dtype=np.bool_), nothing, np.zeros((len(time), 0)))
-    beyond: BoolArray
+    rows, n = np.flatnonzero(used), len(time)
     if not rows.size:
-        return found
+        return _Answers(np.zeros(n), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.zeros((n, 0)))
     state = model.init()._replace(reference=zero)
-    width, directions = np.full(len(rows), np.nan), np.zeros((len(rows), 0))
-    if model.remembers or model.support.policy == "hold":
-        said, beyond = np.empty(len(rows)), np.empty(len(rows), dtype=np.bool_)
-        last, each = float(time[rows[0]]), []
-        for k, row in enumerate(rows.tolist()):
-            state, said[k] = model.step(state, values[row], float(time[row]) - last)
-            beyond[k], last = bool(state.outside.any()), float(time[row])
-            if shown.band:
-                width[k] = model.half_width(state, values[row])
-            if shown.directions:
-                each.append(model.directions(state, values[row]))
-        directions = np.array(each) if each else directions
-    else:  # readings are independent: all in one step
-        state, answers = model.step(state, values[rows], 0.0)
-        said, beyond = np.broadcast_to(answers, rows.shape), np.asarray(state.outside.any(axis=-1))
-        width, directions = model.half_width(state, values[rows]), model.directions(state, values[rows])
-    before = np.cumsum(used) - 1  # index of the last used reading, per row
-    known = before >= 0
-    directions, here = np.zeros((len(time), directions.shape[1])), directions
-    for into, what in zip((*found[:3], directions), (said, beyond, width, here), strict=True):
-        into[known] = what[before[known]]
-    return found._replace(directions=directions)
+    ran = model.run(state, values[rows], np.diff(time[rows], prepend=time[rows[0]]))
+    width = model.widen(ran.change, ran.outputs, ran.deviation) if shown.band else np.full(len(rows), np.nan)
+    directions = ran.outputs[:, 1:] if shown.directions else np.zeros((len(rows), 0))
+    last = np.cumsum(used) - 1  # index of the last used reading, per row
+
+    def spread(values: FloatArray, before: float) -> FloatArray:
+        found = np.concatenate([values, np.full((1, *values.shape[1:]), before)])
+        return np.asarray(found[last])  # -1: before the first
+
+    return _Answers(
+        deviation=spread(ran.deviation, 0.0),
+        outside=spread(ran.outside.max(axis=1, initial=0.0), 0.0) > 0,
+        half_width=spread(width, np.nan),
+        directions=spread(directions, 0.0),
+    )
 
 
 def _adapted(
