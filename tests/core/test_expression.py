@@ -76,11 +76,12 @@ def test_a_run_is_its_steps(
         runs = [model.run(model.init(), table[:cut], steps[:cut])]
         if len(rows) > cut:
             runs.append(model.run(runs[0].state, table[cut:], steps[cut:]))
-    near = {"rtol": 1e-9, "atol": 1e-9}
-    np.testing.assert_allclose(np.concatenate([r.deviation for r in runs]), [s.deviation for s in expected], **near)
+    np.testing.assert_allclose(
+        np.concatenate([r.deviation for r in runs]), [s.deviation for s in expected], rtol=1e-9, atol=1e-9
+    )
     np.testing.assert_array_equal(np.concatenate([r.outside for r in runs]), [s.outside for s in expected])
     assert state.memory is not None
-    np.testing.assert_allclose(runs[-1].state.memory, state.memory, **near)
+    np.testing.assert_allclose(runs[-1].state.memory, state.memory, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(runs[-1].state.reference, state.reference)
 
 
