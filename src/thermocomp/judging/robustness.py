@@ -177,7 +177,7 @@ def stress(
     rows : ndarray of bool of shape (n_rows,)
         Rows to judge.
     """
-    temperatures = np.array([i.quantity == "temperature" for i in model.inputs], dtype=np.bool_)
+    temperatures = np.flatnonzero([i.quantity == "temperature" for i in model.inputs])
     lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
     lost += [names for names in (guard.readings if guard else ()) if len(names) > 1 and {*names} <= {*model.sensors}]
     cut = [[k for k, i in enumerate(model.inputs) if i.name in names] for names in lost]
@@ -191,9 +191,13 @@ def stress(
 
     def disturb(rows: NDArray[np.intp], readings: FloatArray, reference: FloatArray) -> FloatArray:
         batch = np.repeat(readings[:, None], 1 + 2 * draws + len(lost), axis=1)
-        for own in batch:  # a row after the other, so that the noise of a row does not depend on those after it
-            own[1 : 1 + draws, temperatures] += rng.uniform(-NOISE, NOISE, (draws, temperatures.sum()))
-            own[1 + draws : 1 + 2 * draws, temperatures] += rng.normal(0.0, NOISE, (draws, temperatures.sum()))
+        noise = np.empty((2, draws, len(temperatures)))
+        for own in batch:  # a row after the other: the noise of a row does not depend on those after it
+            rng.random(out=noise[0])
+            rng.standard_normal(out=noise[1])
+            noise[0] += noise[0] - 1.0
+            noise *= NOISE
+            own[1 : 1 + 2 * draws, temperatures] += noise.reshape(2 * draws, len(temperatures))
         for variant, (places, through) in enumerate(zip(cut, let, strict=True), start=1 + 2 * draws):
             if guard and lost[variant - 1 - 2 * draws] in guard.readings:
                 for k, values in through.items():
