@@ -1,0 +1,113 @@
+"""Programs written beside the graphs: one runs the test vectors, one runs the graphs inside a compensator."""
+
+TEST = '''"""Runs the graphs of {name} over {name}_vectors.json; exits with 0 if all is well: see {name}.md."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+folder = Path(__file__).parent
+vectors = json.loads((folder / "{name}_vectors.json").read_text(encoding="utf-8"))
+wrong, largest, calls = 0, 0.0, 0
+for file, model in vectors["graphs"].items():
+    session = onnxruntime.InferenceSession(str(folder / file), providers=["CPUExecutionProvider"])
+    if session.get_modelmeta().custom_metadata_map["sha256"] != vectors["sha256"]:
+        sys.exit("the vectors are of another model")
+    ports = {{i.name: np.zeros(i.shape) for i in session.get_inputs()}}
+    ports["zero"][:] = model["zero"]
+    for k, call in enumerate(model["calls"]):
+        for port in ports.keys() & call.keys():
+            ports[port][:] = [float(x) for x in np.ravel(call[port])]
+        [deviation], outside, *state = session.run(None, ports)
+        ports.update(zip(["state"], state))
+        wanted, calls = float(call["deviation"]), calls + 1
+        if np.isnan(wanted):  # rejected
+            good = np.isnan(deviation)
+        else:
+            off = abs(deviation - wanted) / max(1.0, abs(wanted))
+            largest = max(largest, off)
+            good = off <= model["tolerance"] and outside.tolist() == call["outside"]
+        if not good:
+            wrong += 1
+            print(f"{{file}}, call {{k}}: {{deviation}}, outside {{outside.tolist()}}; want {{call}}")
+print(f"{{calls}} calls, {{wrong}} wrong; largest difference {{largest:.1e}} of max(1, deviation)")
+sys.exit(wrong > 0)
+'''
+
+RUN = '''"""Runs the graphs of {name} inside a compensator: python {name}_run.py model.json < readings.csv
+
+The compensator of thermocomp averages the zero, watches the sensors, rejects readings, applies the limits, holds and
+fades. Without one around it, a graph must not drive an axis.
+"""
+
+import csv
+import sys
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+from thermocomp import Limits, Reading
+from thermocomp.core.state import State
+from thermocomp.files.machines import read_models
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.group import Group
+
+MODEL = "{sha256}"  # SHA-256 of the model file
+GRAPHS = {graphs}  # by target
+LIMITS = {limits}
+APPROVED = {approved}  # by target: who uses an unproven model, and why
+
+
+class Graph(Group):
+    """A model of the compensator, evaluated by its graph."""
+
+    def __init__(self, models, k, file):
+        super().__init__(models, [k])
+        self.session = onnxruntime.InferenceSession(str(Path(__file__).with_name(file)))
+
+    def step(self, states, values, dt):
+        (state,) = states
+        known = {{"value": values, "zero": state.reference, "dt": dt}}
+        if state.memory is not None:
+            known["state"] = [1.0, state.deviation, *state.memory]
+        ports = {{i.name: np.zeros(i.shape) for i in self.session.get_inputs()}}
+        for name in ports.keys() & known.keys():
+            ports[name][:] = known[name]
+        [deviation], outside, *after = self.session.run(None, ports)
+        memory = after[0][2:] if after else np.zeros(0)
+        state = State(state.reference, memory, np.array(deviation), outside)
+        return [state], [float(deviation)], [float(self.lead.half_width(state, values))]
+
+
+class GraphCompensator(Compensator):
+    """A compensator whose models are graphs."""
+
+    @cached_property
+    def groups(self):
+        files = [file for target in self.lines for file in GRAPHS[target]]
+        return tuple(Graph(self.models, k, file) for k, file in enumerate(files))
+
+
+def load(path):
+    """Return the compensator of the model file."""
+    if sha256(Path(path).read_bytes()).hexdigest() != MODEL:
+        sys.exit(f"{{path}} is not the model from which the graphs were written")
+    models = [m.taken(APPROVED.get(m.target)) for m in read_models(Path(path)) if m.target in GRAPHS]
+    return GraphCompensator.of(models, LIMITS, watching=True)
+
+
+if __name__ == "__main__":
+    compensator = load(sys.argv[1])
+    state = compensator.start()
+    for row in csv.DictReader(sys.stdin):  # the time, and a column for each input [degC, 1/min]
+        time = float(row.pop("time_s"))
+        reading = Reading(time, {{name: float(value or "nan") for name, value in row.items()}})
+        state, said = compensator.step(state, reading, now=time)
+        corrections = ", ".join(f"{{t}} {{c.offset:.3f}} um, {{c.slope:.3f}} um/m" for t, c in said.corrections.items())
+        print(f"{{time:g}} s: {{corrections}}", said.rejected and f"({{said.rejected}})")
+'''
