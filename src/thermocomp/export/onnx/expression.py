@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from thermocomp.core import expression as e
+from thermocomp.core.curves import Curve
 from thermocomp.core.recurrences import Clock
 from thermocomp.core.ticker import EARLY
 from thermocomp.export.onnx.nodes import BOOL, INT64, Graph
@@ -145,7 +146,7 @@ def _arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str: 
         case e.Clip(of, low, high):
             return g.between(value(of), float(low), float(high))
         case e.Sum(terms):
-            return _sum(g, terms, value)
+            return g.add(*map(value, terms)) if terms else g.constant(0.0)
         case e.Difference(of, minus):
             return g.put("Sub", value(of), value(minus))
         case e.Product(factors):
@@ -160,33 +161,13 @@ def _arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str: 
         case e.Sigmoid(of):
             return g.put("Div", 1.0, g.add(1.0, g.put("Exp", g.put("Neg", value(of)))))
         case e.Lookup(of, x, y, kind):
-            return _look_up(g, value(of), np.array(x), np.array(y), steps=kind == "step")
+            return _look_up(g, value(of), Curve(x, y, kind))
     raise TypeError(f"{node}: is not part of a formula")
 
 
-def _sum(g: Graph, terms: Sequence[e.Node], value: Callable[[e.Node], str]) -> str:
-    """Return a sum; all terms with constant weights are computed together."""
-    weights, weighted, others = list[float](), list[str](), list[str]()
-    for term in terms:
-        match term:
-            case e.Product((e.Constant(weight), part)) if len(terms) > 2:
-                weights.append(weight)
-                weighted.append(value(part))
-            case _:
-                others.append(value(term))
-    if weighted:
-        others.append(g.put("ReduceSum", g.put("Mul", np.array(weights), g.join(weighted)), keepdims=1))
-    return g.add(*others) if others else g.constant(0.0)
-
-
-def _look_up(g: Graph, at: str, x: np.ndarray, y: np.ndarray, *, steps: bool) -> str:
+def _look_up(g: Graph, at: str, curve: Curve) -> str:
     """Return the value of a tabulated function of one variable."""
-    reached = g.put("Cast", g.put("LessOrEqual", x, at), to=INT64)
-    place = g.put("ReduceSum", reached, keepdims=1)
-    if steps:
-        return g.put("Gather", y, place, axis=0)
-    slope = np.concatenate([[0.0], np.diff(y) / np.diff(x), [0.0]])
-    begin, level = np.concatenate([x[:1], x]), np.concatenate([y[:1], y])
-    away = g.put("Sub", at, g.put("Gather", begin, place, axis=0))
-    rise = g.put("Mul", g.put("Gather", slope, place, axis=0), away)
-    return g.add(g.put("Gather", level, place, axis=0), rise)
+    breaks, *pieces = curve.pieces
+    place = g.put("ReduceSum", g.put("Cast", g.put("LessOrEqual", breaks, at), to=INT64), keepdims=1)
+    value, slope, left = (g.put("Gather", table, place, axis=0) for table in pieces)
+    return g.add(value, g.put("Mul", slope, g.put("Sub", at, left)))

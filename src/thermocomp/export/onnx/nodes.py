@@ -28,6 +28,9 @@ class Graph:
     """
 
     def __init__(self, outer: "Graph | None" = None) -> None:
+        from onnx import helper
+
+        self._onnx = helper
         self._nodes: list[NodeProto] = []
         self._inputs: list[ValueInfoProto] = []
         self._outputs: list[ValueInfoProto] = []
@@ -40,17 +43,13 @@ class Graph:
 
     def enter(self, name: str, shape: Sequence[int] = (1,), kind: int = DOUBLE) -> str:
         """Return the name of a new input."""
-        from onnx import helper
-
-        self._inputs.append(helper.make_tensor_value_info(name, kind, shape))
+        self._inputs.append(self._onnx.make_tensor_value_info(name, kind, shape))
         return name
 
     def leave(self, name: str, value: str, shape: Sequence[int] = (1,), kind: int = DOUBLE) -> None:
         """Add an output with a given name and value."""
-        from onnx import helper
-
-        self._nodes.append(helper.make_node("Identity", [value], [name]))
-        self._outputs.append(helper.make_tensor_value_info(name, kind, shape))
+        self._nodes.append(self._onnx.make_node("Identity", [value], [name]))
+        self._outputs.append(self._onnx.make_tensor_value_info(name, kind, shape))
 
     def constant(self, numbers: Value) -> str:
         """Return the name of a numeric constant; a scalar becomes a vector of one element."""
@@ -62,10 +61,8 @@ class Graph:
 
     def put(self, op: str, *inputs: Value, **attributes: Any) -> str:
         """Return the name of an operator's output."""
-        from onnx import helper
-
         found = self.name()
-        self._nodes.append(helper.make_node(op, [self.constant(i) for i in inputs], [found], **attributes))
+        self._nodes.append(self._onnx.make_node(op, [self.constant(i) for i in inputs], [found], **attributes))
         return found
 
     def add(self, *terms: Value) -> str:
@@ -95,19 +92,17 @@ class Graph:
 
     def proto(self, name: str) -> "GraphProto":
         """Return the graph as an ONNX proto; constants belong to the outermost graph."""
-        from onnx import helper
-
-        return helper.make_graph(self._nodes, name, self._inputs, self._outputs)
+        return self._onnx.make_graph(self._nodes, name, self._inputs, self._outputs)
 
     def serialize(self, name: str, facts: Sequence[str], properties: dict[str, str], version: str) -> bytes:
         """Return the contents of the file of this graph."""
-        from onnx import checker, helper, numpy_helper
+        from onnx import checker, numpy_helper
 
         proto = self.proto(name)
         proto.initializer.extend(numpy_helper.from_array(table, name) for name, table in self._constants.values())
-        opsets, text = [helper.make_opsetid("", OPSET)], "\n".join(facts)
-        model = helper.make_model(proto, opset_imports=opsets, ir_version=IR, doc_string=text)
+        opsets, text = [self._onnx.make_opsetid("", OPSET)], "\n".join(facts)
+        model = self._onnx.make_model(proto, opset_imports=opsets, ir_version=IR, doc_string=text)
         model.producer_name, model.producer_version = "thermocomp", version
-        helper.set_model_props(model, properties)
+        self._onnx.set_model_props(model, properties)
         checker.check_model(model, full_check=True)
         return bytes(model.SerializeToString(deterministic=True))
