@@ -232,8 +232,8 @@ def check_runs(folder: Path, compensator: Compensator) -> Any:
 @pytest.mark.parametrize("policy", ["clip", "hold"])
 def test_inside_a_compensator(tmp_path: Path, policy: Literal["clip", "hold"]) -> None:
     first = replace(watched_model("z_um"), support=Support(policy))
-    shared = {"zeroing": first.zeroing, "watch": first.watch}
-    models = [first, replace(first, target="x_um"), accepted(ticking("t"), **shared)]
+    shared: dict[str, Any] = {"zeroing": first.zeroing, "watch": first.watch}
+    models: list[ErrorModel] = [first, replace(first, target="x_um"), accepted(ticking("t"), **shared)]
     models += [replace(growing("y_um", 2.0), honest_error=UNPROVEN, **shared)]
     said = check_runs(tmp_path, package(tmp_path, models, Limits(magnitude=15.0, rate=0.05, dead_band=0.2)))
     assert np.abs(said.correction[:, 0]).max() > 10.0

@@ -1,6 +1,7 @@
 """The expression of a model as ONNX operators, and its memory between two calls."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -75,25 +76,25 @@ class Walk:
         g, interval, n, k = self._graph, clock.interval, len(clock.leaves), clock.past
         m = max((p.ticks for p in e.walk_nodes(clock.tick, (e.Mean,)) if isinstance(p, e.Mean)), default=0)
         now = g.join([self.value(leaf) for leaf in clock.leaves])
-        first = [np.zeros(1 + n + k), *([now, np.zeros((m - 1) * n)] if m else [])]
-        held = self._before(g.join(first), 1 + n + k + m * n)
-        phase, total, own = (g.pick(held, range(a, b)) for a, b in ((0, 1), (1, 1 + n), (1 + n, 1 + n + k)))
-        past = [g.pick(held, range(1 + n + k, 1 + n + k + m * n))] if m else []
+        rest = g.constant(np.zeros(1 + n + k))
+        held = self._before(g.join([rest, now, np.zeros((m - 1) * n)]) if m else rest, 1 + n + k + m * n)
+        ends = np.cumsum([0, 1, n, k, m * n]).tolist()
+        phase, total, own, past = (g.pick(held, range(a, b)) for a, b in pairwise(ends))
         clocks = g.add(phase, self._dt)
         ticks = g.put("Floor", g.add(g.put("Div", clocks, interval), EARLY))
-        rest = g.put("Mul", g.put("Sub", interval, phase), now)
-        mean = g.put("Div", g.add(total, rest), interval)  # over the interval that ends at the first tick
+        left = g.put("Mul", g.put("Sub", interval, phase), now)
+        mean = g.put("Div", g.add(total, left), interval)  # over the interval that ends at the first tick
         trips = g.put("Cast", g.put("Min", ticks, float(MOST_TICKS)), to=INT64)
-        held = g.put("Loop", trips, "", g.join([own, mean, *past]), body=_body(g, clock, now, m * n).proto("body"))
-        own, *past = [g.pick(held, range(k)), *([g.pick(held, range(k + n, k + n + m * n))] if m else [])]
+        held = g.put("Loop", trips, "", g.join([own, mean, past]), body=_body(g, clock, now, m * n).proto("body"))
+        own, past = g.pick(held, range(k)), g.pick(held, range(k + n, k + n + m * n))
         ticked = g.put("Greater", ticks, 0.0)
         left = g.between(g.put("Sub", clocks, g.put("Mul", ticks, interval)), -EARLY * interval, interval)
         phase = g.choose(ticked, left, clocks)
         total = g.add(g.choose(ticked, 0.0, total), g.put("Mul", g.choose(ticked, phase, self._dt), now))
-        self.memory += [phase, total, own, *past]
+        self.memory += [phase, total, own, past]
         runs, last = g.put("Greater", phase, EARLY * interval), g.pick(own, [0])
         mean = g.put("Div", total, g.choose(runs, phase, 1.0))
-        ahead = g.put("Sub", _tick(g, clock, g.join([own, mean, *past])), last)
+        ahead = g.put("Sub", _tick(g, clock, g.join([own, mean, past])), last)
         return g.choose(runs, g.add(last, g.put("Mul", g.put("Div", phase, interval), ahead)), last)
 
 
