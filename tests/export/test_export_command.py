@@ -274,6 +274,11 @@ def test_a_graph_that_is_written_proves_itself(tmp_path: Path) -> None:
     done = prove_graph(tmp_path / "a")
     assert done.returncode == 0, done.stdout + done.stderr
     assert ", 0 wrong; largest difference " in done.stdout
+    page = re.search(r"^    python (tc_mill_run\.py) model\.json < ", (tmp_path / "a" / "tc_mill.md").read_text(), re.M)
+    assert page is not None
+    command, rows = [sys.executable, page[1], str(model)], "time_s,t1_C,t2_C,t3_C,spindle_rpm\n0,20,20,20,0\n"
+    done = subprocess.run(command, input=rows, cwd=tmp_path / "a", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "0 s: z_um 0.000 um, 0.000 um/m"), done.stderr
     assert run([*line, str(tmp_path / "b"), "--name", "mill"]) == 1
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert names == ["tc_mill.md", "tc_mill_run.py", "tc_mill_test.py", "tc_mill_vectors.json", "tc_mill_z_um.onnx"]

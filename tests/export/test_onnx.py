@@ -267,7 +267,7 @@ def test_another_model_file_is_rejected(tmp_path: Path) -> None:
 def test_readings_become_corrections(tmp_path: Path) -> None:
     package(tmp_path, [growing("x_um", 2.0)], Limits(magnitude=12.0, rate=1.0))
     command = [sys.executable, str(tmp_path / "tc_mill_run.py"), str(tmp_path / "model.json")]
-    rows = "time_s,t\n0,21\n10,24\n20,\n30,24.5\n60,40\n"
+    rows = "time_s,t,note\n0,21,cold\n10,24,\n20,,lost\n30,24.5,\n60,40,\n"
     done = subprocess.run(command, input=rows, capture_output=True, text=True, check=True)
     assert [line.strip() for line in done.stdout.splitlines()] == [
         "0 s: x_um 0.000 um, 0.000 um/m",

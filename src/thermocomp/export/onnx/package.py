@@ -43,9 +43,9 @@ same vectors in the runtime of the controller; "nan" there is not a number.
     pip install thermocomp onnxruntime
     python {name}_run.py {model} < readings.csv
 
-prints the corrections, within {limits}. For a program of your own, `load` in this file returns the compensator. It
-works like `thermocomp serve`, with zero, gate, watch, limits, hold and fade; `thermocomp export --to c99` is all of it
-in C.
+prints the corrections, within {limits}, for a file with a column `time_s` and one per input. For a program of your
+own, `load` in it returns the compensator. It works like `thermocomp serve`, with zero, gate, watch, limits, hold and
+fade; `thermocomp export --to c99` writes all of this in C.
 
 ## Call a graph
 

@@ -95,10 +95,12 @@ def load(path):
 
 if __name__ == "__main__":
     compensator = load(sys.argv[1])
+    known = [*compensator.models, *compensator.watches]
+    names = {{i.name for k in known for i in k.inputs}} | {{k.zeroing.speed for k in known}}
     state = compensator.start()
-    for row in csv.DictReader(sys.stdin):  # the time, and a column for each input [degC, 1/min]
-        time = float(row.pop("time_s"))
-        reading = Reading(time, {{name: float(value or "nan") for name, value in row.items()}})
+    for row in csv.DictReader(sys.stdin):  # the time [s], and a column for each input [degC, 1/min]
+        time = float(row["time_s"])
+        reading = Reading(time, {{name: float(row[name] or "nan") for name in names & row.keys()}})
         state, said = compensator.step(state, reading, now=time)
         corrections = ", ".join(f"{{t}} {{c.offset:.3f}} um, {{c.slope:.3f}} um/m" for t, c in said.corrections.items())
         print(f"{{time:g}} s: {{corrections}}", said.rejected and f"({{said.rejected}})")
