@@ -104,9 +104,9 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         axes=_axes(compensator),
     )
     run = RUN.format(name=name, sha256=facts.sha256, graphs=graphs, limits=compensator.limits, approved=approved)
-    tests = {"facts": said, "sha256": facts.sha256, "graphs": vectors}
+    tests = json.dumps({"facts": said, "sha256": facts.sha256, "graphs": vectors}, ensure_ascii=False, allow_nan=False)
     return files | {
-        f"{name}_vectors.json": json.dumps(tests, ensure_ascii=False, allow_nan=False).encode(),
+        f"{name}_vectors.json": tests.replace(', {"value"', ',\n{"value"').encode(),  # a call per line
         f"{name}_test.py": TEST.format(name=name).encode(),
         f"{name}_run.py": run.encode(),
         f"{name}.md": readme.encode(),
