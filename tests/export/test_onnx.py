@@ -327,6 +327,7 @@ def test_the_file_says_what_it_is_and_is_the_same_each_time() -> None:
     assert facts[0] == "z_um: accepted on unseen cycles; SHADOW ONLY, y_um: corrections stay zero"
     assert files[f"{name}.md"].decode().splitlines()[: len(facts)] == [f"{line}  " for line in facts]
     assert json.loads(files[f"{name}_vectors.json"])["facts"][0] == facts[0]
+    assert files[f"{name}_run.py"].decode().splitlines()[0] == f"# {facts[0]}"
     verdicts = []
     for file in list(files)[:2]:
         model = onnx.load_from_string(files[file])
@@ -355,7 +356,7 @@ def test_the_file_says_what_it_is_and_is_the_same_each_time() -> None:
 def test_targets_with_like_names_have_files_of_their_own() -> None:
     compensator = Compensator.of([growing("a b", 1.0), growing("a_b", 2.0), growing("\u4e3b", 3.0)])
     graphs = [name for name in write_package(compensator, "mill", FACTS) if name.endswith(".onnx")]
-    assert graphs == ["tc_mill_a_b.onnx", "tc_mill_a_b_.onnx", "tc_mill__.onnx"]
+    assert graphs == ["tc_mill_a_b.onnx", "tc_mill_a_b_.onnx", "tc_mill_\u4e3b.onnx"]
 
 
 @pytest.mark.parametrize("model", [replace(watched_model("z_um"), support=Support("fade")), net("z_um")])

@@ -86,7 +86,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         if taken and target not in compensator.shadow:
             approved[target] = taken[0]
         for k, model in enumerate(models, start=1):
-            stem = f"{name}_{re.sub(r'[^0-9A-Za-z]+', '_', target)}" + (f"_{k}" if len(models) > 1 else "")
+            stem = re.sub(r"\W+", "_", f"{name}_{target}_{k}" if len(models) > 1 else f"{name}_{target}")
             while (file := f"{stem}.onnx") in files:
                 stem += "_"
             files[file] = translate(model).serialize(stem, own, _properties(model, own, facts), facts.version)
@@ -103,7 +103,14 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         inputs="\n".join(rows),
         axes=_axes(compensator),
     )
-    run = RUN.format(name=name, sha256=facts.sha256, graphs=graphs, limits=compensator.limits, approved=approved)
+    run = RUN.format(
+        verdict=said[0],
+        name=name,
+        sha256=facts.sha256,
+        graphs=graphs,
+        limits=compensator.limits,
+        approved=approved,
+    )
     tests = json.dumps({"facts": said, "sha256": facts.sha256, "graphs": vectors}, ensure_ascii=False, allow_nan=False)
     return files | {
         f"{name}_vectors.json": tests.replace(', {"value"', ',\n{"value"').encode(),  # a call per line

@@ -32,7 +32,8 @@ print(f"{{calls}} calls, {{wrong}} wrong; largest difference {{largest:.1e}} of 
 sys.exit(wrong > 0)
 '''
 
-RUN = '''"""Runs the graphs of {name} inside a compensator: python {name}_run.py model.json < readings.csv
+RUN = '''# {verdict}
+"""Runs the graphs of {name} inside a compensator: python {name}_run.py model.json < readings.csv
 
 The compensator of thermocomp averages the zero, watches the sensors, rejects readings, applies the limits, holds and
 fades. Without one around it, a graph must not drive an axis.
