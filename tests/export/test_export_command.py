@@ -274,22 +274,26 @@ def test_a_graph_that_is_written_proves_itself(tmp_path: Path) -> None:
     done = prove_graph(tmp_path / "a")
     assert done.returncode == 0, done.stdout + done.stderr
     assert ", 0 wrong; largest difference " in done.stdout
+    page = re.search(r"^    python (tc_mill_run\.py) model\.json < ", (tmp_path / "a" / "tc_mill.md").read_text(), re.M)
+    assert page is not None
+    command, rows = [sys.executable, page[1], str(model)], "time_s,t1_C,t2_C,t3_C,spindle_rpm\n0,20,20,20,0\n"
+    done = subprocess.run(command, input=rows, cwd=tmp_path / "a", capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "0 s: z_um 0.000 um, 0.000 um/m"), done.stderr
     assert run([*line, str(tmp_path / "b"), "--name", "mill"]) == 1
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
-    assert names == ["tc_mill.md", "tc_mill.onnx", "tc_mill_test.py", "tc_mill_vectors.json"]
+    assert names == ["tc_mill.md", "tc_mill_run.py", "tc_mill_test.py", "tc_mill_vectors.json", "tc_mill_z_um.onnx"]
     assert all((tmp_path / "a" / n).read_bytes() == (tmp_path / "b" / n).read_bytes() for n in names)
 
 
-def test_a_graph_of_what_is_unproven_stays_zero(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_graph_of_what_is_unproven_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = written(tmp_path, judged("x_um", ACCEPTED), judged("y_um", UNPROVEN))
     assert run(["export", str(model), "--to", "onnx", "-o", str(tmp_path / "out")]) == 0
     first = "x_um: accepted on unseen cycles; SHADOW ONLY, y_um: corrections stay zero"
     assert capsys.readouterr().out.splitlines()[0] == first
     assert (tmp_path / "out" / "tc_thermal.md").read_text().splitlines()[0].strip() == first
     assert prove_graph(tmp_path / "out").returncode == 0
-    calls = json.loads((tmp_path / "out" / "tc_thermal_vectors.json").read_text())["calls"]
-    assert max(abs(c["correction"][0]) for c in calls) > 10.0
-    assert {c["correction"][1] for c in calls} == {0.0}
+    assert b"SHADOW ONLY, y_um: not proven" in (tmp_path / "out" / "tc_thermal_y_um.onnx").read_bytes()
+    assert b"SHADOW ONLY" not in (tmp_path / "out" / "tc_thermal_x_um.onnx").read_bytes()
 
 
 def test_without_onnx_it_says_what_to_install(

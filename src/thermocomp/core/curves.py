@@ -48,13 +48,13 @@ class Curve:
             )
         if any(not a < b for a, b in pairwise(self.x)):
             raise SettingError(f"{self.kind} curve: x must increase strictly")
-        if not np.isfinite(self._pieces[2]).all():
+        if not np.isfinite(self.pieces[2]).all():
             raise SettingError(
                 f"{self.kind} curve: two x values are too close together: the slope between them is not finite"
             )
 
     @cached_property
-    def _pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def pieces(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return the break points, and per piece the value at its left end, its slope and its left end."""
         x, y = np.array(self.x, dtype=np.float64), np.array(self.y, dtype=np.float64)
         if self.kind == "step":
@@ -79,7 +79,7 @@ class Curve:
 
     def __call__(self, variable: FloatArray) -> FloatArray:
         """Return the values at `variable` element by element; scalar and batch results are bit-identical."""
-        breaks, value, slope, left = self._pieces
+        breaks, value, slope, left = self.pieces
         piece = breaks.searchsorted(variable, side="right")
         if self.kind == "step":
             return np.asarray(value[piece])

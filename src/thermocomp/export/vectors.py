@@ -1,7 +1,7 @@
 """Test vectors: readings, including faulty ones, and the compensator's response to each."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, NamedTuple
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from thermocomp.core.autoregressive import Autoregressive, find_largest_root
 from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP
+from thermocomp.core.expression import Recurrence
+from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.reading import Reading
 from thermocomp.core.validity import Validity
@@ -18,7 +20,6 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import RETURN, WORDS
 
 FloatArray = NDArray[np.float64]
@@ -51,19 +52,12 @@ def replay(
     compensator: Compensator,
     tables: Tables,
     readings: Readings,
-    start: CompensatorState | None = None,
     *,
     rounded: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Answers:
-    """Replay readings through a compensator from its initial state and return its outputs.
-
-    Parameters
-    ----------
-    start : CompensatorState, optional
-        State to start from. Default: `Compensator.start`.
-    """
+    """Replay readings through a compensator from its initial state and return its outputs."""
     names, targets = [c.name for c in tables.channels], tables.targets
-    state, clock, begun, rows = start or compensator.start(), 0.0, False, []
+    state, clock, begun, rows = compensator.start(), 0.0, False, []
     for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
@@ -117,7 +111,7 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
     return value
 
 
-def find_tolerance(tables: Tables) -> float:
+def find_tolerance(models: Sequence[ErrorModel]) -> float:
     """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
 
     Returns
@@ -126,9 +120,10 @@ def find_tolerance(tables: Tables) -> float:
         As a fraction of the correction, or in um for corrections below 1 um.
     """
     # effect of rounding in the last digit on a decaying sum, and on many ticks at once
-    slow = [(1.0 - sum(m.a)) * (1.0 - find_largest_root(m.a)) for m in tables.models if isinstance(m, Autoregressive)]
+    slow = [(1.0 - sum(m.a)) * (1.0 - find_largest_root(m.a)) for m in models if isinstance(m, Autoregressive)]
     most = 10.0 * float(np.finfo(np.float64).eps) / min(slow, default=1.0)
-    return max(most, 1e-11 if tables.sizes["CLOCKS"] else 1e-12)
+    clocks = any(isinstance(n, Recurrence) for m in models for n in m.remembered)
+    return max(most, 1e-11 if clocks else 1e-12)
 
 
 def make_readings(tables: Tables) -> Readings:

@@ -110,7 +110,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
 def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
     """Return the tolerance for double precision: large coefficients amplify the last digit of a reading."""
     rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
-    return max(find_tolerance(tables), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
+    return max(find_tolerance(tables.models), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:

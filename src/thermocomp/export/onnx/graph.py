@@ -1,140 +1,82 @@
-"""A compensator as one step of ONNX: values and a state in, corrections and the next state out.
+"""A model as a graph: `ErrorModel.step` with the zero, the time step and the state as inputs."""
 
-The processing chain is that of `thermocomp.runtime.program.steps`, without the watch over the sensors and without the
-averaging of the zero: the caller supplies the zero.
-"""
-
-from dataclasses import dataclass
-from itertools import pairwise
+import math
+import sys
 
 import numpy as np
 
-from thermocomp.core.bounds import GAP, MEMORY, READING
-from thermocomp.export.onnx.expression import Memory, Walk
-from thermocomp.export.onnx.limits import Drive
-from thermocomp.export.onnx.nodes import Graph
-from thermocomp.export.onnx.support import support
-from thermocomp.runtime.program.steps import ACTIVE, FADING, HOLDING, SHADOW
-from thermocomp.runtime.program.tables import Tables, formula
+from thermocomp.core.bounds import GAP, READING
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.model import ErrorModel
+from thermocomp.export.onnx.expression import Walk
+from thermocomp.export.onnx.nodes import BOOL, Graph
 
-#: elements at the beginning of the state: has begun, clock, values were used, time of last use
-CLOCKS = 4
+#: elements at the beginning of the state, before the memory: whether there was a reading, and the last deviation
+FIRST = 2
 
 
-@dataclass(frozen=True)
-class GraphBlock:
-    """A compensator as a graph.
+def translate(model: ErrorModel) -> Graph:
+    """Return the graph of a model.
 
-    Parameters
-    ----------
-    size : int
-        Number of elements of its state.
-    deviation : int
-        Index of the models' deviations in the state.
+    Its inputs are ``value`` and ``zero`` in the order of the model's inputs, ``dt`` [s] if the model has a memory, and
+    ``state`` if it has one or holds its deviation; its outputs ``deviation``, ``outside`` by input, and ``next_state``.
+    Where `ErrorModel.step` rejects its arguments, the deviation is NaN and the state unchanged.
     """
-
-    graph: Graph
-    size: int
-    deviation: int
-
-
-@dataclass(frozen=True)
-class _Moment:
-    """Time of a call, and whether its values are used.
-
-    Parameters
-    ----------
-    passes, seen : str
-        Whether the values are used; whether earlier values were used.
-    travel, step : str
-        Time available for moving the corrections, and time since the last values used [s].
-    clocks : str
-        Elements of the next state.
-    """
-
-    passes: str
-    seen: str
-    travel: str
-    step: str
-    clocks: str
-
-
-def translate(tables: Tables) -> GraphBlock:
-    """Return a compensator as a graph of one step."""
-    g, n, targets = Graph(), len(tables.channels), len(tables.targets)
-    places = [CLOCKS + k * targets for k in range(4)]
-    value, zero, dt = g.enter("value", (n,)), g.enter("zero", (n,)), g.enter("dt")
-    drive = Drive(g, tables)
-    state = _checked(g, drive, "state", places)
-    change, plausible = _changes(g, tables, value, zero)
-    moment = _moment(g, tables, state, dt, plausible)
-    idle, correction, slope = (g.part(state, a, a + targets) for a in places[:3])
-    memory = Memory(g, state, places[3])
-    learned = _models(g, tables, memory, moment, change)
-    learned = g.choose(moment.passes, learned, g.part(state, places[3], memory.end))
-    idle = g.choose(moment.passes, np.zeros(targets), g.add(idle, moment.travel))
-    moved = drive.move(g.part(learned, 0, len(tables.models)), correction, slope, moment.travel)
-    rested = drive.rest(correction, slope, idle, moment.travel)
-    correction, slope = (g.choose(moment.passes, a, b) for a, b in zip(moved, rested, strict=True))
-    waits = g.choose(g.put("Greater", idle, tables.values["hold"]), FADING, HOLDING)
-    status = g.choose(np.array(tables.values["shadow"]), SHADOW, g.choose(moment.passes, ACTIVE, waits))
-    g.enter("state", (memory.end,))
-    g.leave("correction", correction, (targets,))
-    g.leave("slope", slope, (targets,))
-    g.leave("status", status, (targets,), np.int64)
-    g.leave("next_state", g.join([moment.clocks, idle, correction, slope, learned]), (memory.end,))
-    return GraphBlock(g, memory.end, places[3])
+    g, n = Graph(), len(model.inputs)
+    value, zero = g.enter("value", (n,)), g.enter("zero", (n,))
+    fixed = np.array([i.reference for i in model.inputs], dtype=np.float64)
+    zero = g.choose(np.array([i.rezero for i in model.inputs], dtype=np.bool_), zero, fixed)
+    change = g.put("Sub", g.between(value, -READING, READING), zero)
+    low, high, _ = map(np.array, model.bounds)
+    clipped = g.between(change, low, high)
+    inside = g.put("Equal", clipped, change)
+    finite = [g.put("LessOrEqual", g.put("Abs", x), sys.float_info.max) for x in (value, zero)]
+    good = g.every(*finite)
+    begun, dt, kept = "", "", model.remembers or model.support.policy == "hold"
+    if model.remembers:
+        begun, dt = g.put("Greater", g.pick("state", [0]), 0.5), g.enter("dt")
+        timely = [g.put("GreaterOrEqual", dt, 0.0), g.put("LessOrEqual", dt, sys.float_info.max)]
+        good = g.every(good, *timely)
+        dt = g.choose(g.put("And", good, begun), g.put("Min", dt, GAP), 0.0)
+    walk = Walk(g, [g.pick(clipped, [k]) for k in range(n)], begun, dt, "state", FIRST)
+    for node in model.remembered:
+        walk.value(node)
+    said = _support(g, model, change, inside, walk.value(model.expression(model.leaves)))
+    g.leave("deviation", g.choose(good, said, math.nan))
+    g.leave("outside", g.put("Not", inside), (n,), BOOL)
+    if kept:
+        g.enter("state", (walk.size,))
+        g.leave("next_state", g.choose(good, g.join([1.0, said, *walk.memory]), "state"), (walk.size,))
+    return g
 
 
-def _checked(g: Graph, drive: Drive, state: str, places: list[int]) -> str:
-    """Return the incoming state, or the initial state if it contains values that this graph cannot have produced."""
-    correction, slope = (g.part(state, a, b) for a, b in pairwise(places[1:]))
-    finite = g.every(g.put("LessOrEqual", g.put("Abs", state), MEMORY))
-    sound = g.put("And", finite, drive.holds(correction, slope))
-    return g.choose(sound, state, 0.0)
+def _support(g: Graph, model: ErrorModel, change: str, inside: str, said: str) -> str:
+    """Return the deviation after the support policy of a model."""
+    policy = model.support.policy
+    if policy == "clip":
+        return said
+    far = _distance(g, model.joint, change) if model.joint is not None else g.constant(0.0)
+    if policy == "hold":
+        return g.choose(g.every(inside, g.put("LessOrEqual", far, 1.0)), said, g.pick("state", [1]))
+    low, high, span = map(np.array, model.bounds)
+    beyond = g.put("Max", g.put("Sub", low, change), g.put("Sub", change, high))
+    excess = g.put("Div", g.put("Min", beyond, span), span)
+    over = g.put("Div", g.put("Sub", far, 1.0), model.support.fade_over)
+    most = g.put("ReduceMax", g.join([excess, over]), keepdims=1)
+    return g.put("Mul", said, g.between(g.put("Sub", 1.0, most), 0.0, 1.0))
 
 
-def _changes(g: Graph, tables: Tables, value: str, zero: str) -> tuple[str, str]:
-    """Return all inputs minus their zero, and whether all are present, finite and plausible.
-
-    An invalid value is replaced by its zero, an invalid zero by the training zero; such a call is rejected.
-    """
-    t = tables.values
-    rezero, applies, reference = np.array(t["rezero"]), np.array(t["applies"]), np.array(t["reference"])
-    given, begin = g.pick(value, t["channel"]), g.pick(zero, t["channel"])
-    known = g.put("LessOrEqual", g.put("Abs", begin), READING)
-    begin = g.choose(g.put("And", rezero, known), begin, reference)
-    bounded = applies > 0
-    low, high, room = (np.array(t[name]) for name in ("low", "high", "room"))
-    least = g.put("Max", np.array(t["least"]), g.choose(bounded, g.put("Sub", g.add(begin, low), room), -np.inf))
-    most = g.put("Min", np.array(t["most"]), g.choose(bounded, g.add(begin, high, room), np.inf))
-    there = g.put("And", g.put("GreaterOrEqual", given, least), g.put("LessOrEqual", given, most))
-    used = g.choose(there, given, begin)
-    return g.put("Sub", used, begin), g.every(g.put("And", there, g.put("Or", known, ~rezero)))
-
-
-def _moment(g: Graph, tables: Tables, state: str, dt: str, plausible: str) -> _Moment:
-    """Return the time of a call; an invalid time changes nothing."""
-    begun, clock, seen, last = (g.pick(state, k) for k in range(CLOCKS))
-    begun, seen = g.put("Greater", begun, 0.5), g.put("Greater", seen, 0.5)
-    good = g.put("And", g.put("GreaterOrEqual", dt, 0.0), g.put("LessOrEqual", dt, GAP))
-    now = g.add(clock, g.choose(g.put("And", good, begun), dt, 0.0))
-    later = g.put("Or", g.put("Not", seen), g.put("Greater", now, last))
-    passes = g.put("And", g.put("And", good, later), plausible)
-    travel = g.put("Min", g.put("Sub", now, clock), tables.values["reading_age"])
-    since = g.between(g.put("Sub", now, last), 0.0, GAP)
-    step = g.choose(g.put("And", seen, passes), since, 0.0)
-    flags = (g.choose(g.put("Or", was, new), 1.0, 0.0) for was, new in ((begun, good), (seen, passes)))
-    clocks = g.join([next(flags), now, next(flags), g.choose(passes, now, last)])
-    return _Moment(passes=passes, seen=seen, travel=travel, step=step, clocks=clocks)
-
-
-def _models(g: Graph, tables: Tables, memory: Memory, moment: _Moment, change: str) -> str:
-    """Return the outputs of the models, and their next state."""
-    last = memory.before(len(tables.models))
-    inputs = [g.pick(change, k) for k in range(len(tables.ranges))]
-    walk, said = Walk(g, inputs, moment.seen, moment.step, memory), list[str]()
-    for k, model in enumerate(tables.models):
-        own = g.pick(change, [tables.ranges.index(i) for i in model.inputs]) if model.inputs else change
-        said.append(support(g, model, own, walk.value(formula(model, tables.ranges)), g.pick(last, k)))
-    return g.join([*said, *memory.after])
+def _distance(g: Graph, joint: JointSupport, change: str) -> str:
+    """Return the joint distance of inputs from the training data: 1 is the limit."""
+    parts = [g.constant(0.0)]
+    if joint.columns:
+        unit = joint.limit * math.sqrt(len(joint.columns))
+        state = g.put("Mul", g.pick(change, joint.columns), 1.0 / (np.array(joint.scale) * unit))
+        away = g.put("Sub", state, np.array(joint.points, dtype=np.float64) / unit)
+        squares = g.put("ReduceSum", g.put("Mul", away, away), np.array([1]), keepdims=0)
+        parts.append(g.put("Sqrt", g.put("ReduceMin", squares, keepdims=1)))
+    for k, levels, tolerance in zip(joint.speeds, joint.levels, joint.tolerances, strict=True):
+        away = g.put("Abs", g.put("Sub", g.pick(change, [k]), np.array(levels, dtype=np.float64)))
+        parts.append(g.put("Div", g.put("ReduceMin", away, keepdims=1), tolerance))
+    # identical on every processor
+    return g.put("Div", g.put("Round", g.put("Mul", g.put("Max", *parts), 1e6)), 1e6)

@@ -21,7 +21,7 @@ _PAGE = """
 ## Into the NC
 
 For a SINUMERIK ONE, whose PLC is an S7-1500. The PLC of an 840D sl (S7-300) knows no LReal, that of an 828D or
-808D no SCL: there another computer has to run the compensator (C99, ONNX or `thermocomp serve`).
+808D no SCL: there another computer has to run the compensator (C99 or `thermocomp serve`).
 
 dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` makes these of `correction` and `slope` of `{name}`:
 

@@ -110,7 +110,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
 
 def allow(tables: Tables) -> float:
     """Return the tolerance, as a fraction of the correction, or in um for corrections below 1 um."""
-    return max(_TOLERANCE, find_tolerance(tables))
+    return max(_TOLERANCE, find_tolerance(tables.models))
 
 
 def _finite(given: Iterable[float]) -> list[float]:
