@@ -28,7 +28,7 @@ from thermocomp.core.joint import JointSupport
 from thermocomp.core.layers import Layers
 from thermocomp.core.provenance import HonestError, Provenance, read_approval
 from thermocomp.core.rows import run_table
-from thermocomp.core.state import Run, State
+from thermocomp.core.state import RunOutputs, State
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import FIRST_READING, Zeroing
@@ -174,7 +174,7 @@ class ErrorModel(Gated, ModelFamily):
             deviation = self._range.keep(self.support, state.deviation, deviation, change, clipped, far)
         return State(reference, memory, deviation, outside), deviation
 
-    def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> Run:
+    def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> RunOutputs:
         """Process readings one after another: as `step`, but in a fraction of the time.
 
         Parameters
@@ -214,7 +214,7 @@ class ErrorModel(Gated, ModelFamily):
                 before = found[k]
             deviation = found
         last = State(reference, memory, deviation[-1], outside[-1])
-        return Run(state=last, deviation=deviation, outside=outside, change=clipped, outputs=outputs)
+        return RunOutputs(state=last, deviation=deviation, outside=outside, change=clipped, outputs=outputs)
 
     def _refuse_reading(self, inputs: FloatArray, dt: float) -> ReadingError:
         return ReadingError(
@@ -272,7 +272,7 @@ class ErrorModel(Gated, ModelFamily):
         return self.widen(change, found, state.deviation)
 
     def widen(self, change: FloatArray, outputs: FloatArray, deviation: FloatArray) -> FloatArray:
-        """Return the half-widths, (...,), from the clipped changes, the outputs and the deviation of a `Run`."""
+        """Return the half-widths, (...,), from the clipped changes, the outputs and the deviation of a `RunOutputs`."""
         if self.band is None:
             return np.full(deviation.shape, np.nan)
         kept: FloatArray | float = 0.0

@@ -12,11 +12,11 @@ from thermocomp.core.columns import Columns, count_rows, read_clock, read_number
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Node
 from thermocomp.core.inputs import Input
-from thermocomp.core.state import Run, State
+from thermocomp.core.state import RunOutputs, State
 from thermocomp.core.zero import Zeroing, find_zero
 
 
-class Runs(Protocol):
+class Runnable(Protocol):
     """Interface of a model for a replay; see `thermocomp.core.model.ErrorModel`."""
 
     @property
@@ -38,24 +38,24 @@ class Runs(Protocol):
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed."""
 
-    def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> Run:
+    def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> RunOutputs:
         """Process readings one after another."""
 
 
 class TableRun(NamedTuple):
-    """Runs of a model through the tests of a table."""
+    """Runnable of a model through the tests of a table."""
 
-    runs: list[Run]
+    runs: list[RunOutputs]
     places: NDArray[np.intp]  #: (n_rows,), last complete reading of the test, over all runs; -1: none yet
 
-    def spread(self, value: Callable[[Run], FloatArray], before: float) -> FloatArray:
+    def spread(self, value: Callable[[RunOutputs], FloatArray], before: float) -> FloatArray:
         """Return a value of each reading for the rows; `before` the first complete reading of a test."""
         known = np.concatenate([np.empty(0), *(value(run) for run in self.runs)])
         return np.append(known, before)[self.places]
 
 
 def run_table(
-    model: Runs,
+    model: Runnable,
     table: Columns,
     time: ArrayLike | str | None = None,
     *,
@@ -79,7 +79,7 @@ def run_table(
     if model.zeroing.speed in table:
         speed = read_numbers(table, model.zeroing.speed, f"model of {model.target}")
         resting = np.array([model.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
-    runs, places, done = list[Run](), np.full(n, -1), 0
+    runs, places, done = list[RunOutputs](), np.full(n, -1), 0
     for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
         own, rows = slice(a, b), a + np.flatnonzero(usable[a:b])
         if not rows.size:

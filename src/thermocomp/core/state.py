@@ -17,7 +17,7 @@ class State(NamedTuple):
     outside: BoolArray  #: (..., n_inputs), inputs beyond the trained range
 
 
-class Run(NamedTuple):
+class RunOutputs(NamedTuple):
     """Answers of a model to readings, one after another; further axes are a batch of independent runs."""
 
     state: State  #: after the last reading
