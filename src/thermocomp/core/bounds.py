@@ -18,7 +18,7 @@ from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 
-#: largest coefficient, weight, gain, threshold, curve value or intercept: a micrometre per 1e-15 of an input [-]
+#: largest coefficient, weight, gain, threshold, curve value or intercept, such as 1 um per 1e-15 of an input [-]
 COEFFICIENT = 1e15
 #: largest reference or end of a trained range in house units: 1,000 km, 1e9 1/min, a time stamp
 RANGE = 1e9

@@ -123,7 +123,7 @@ class Lag:
 
 @dataclass(frozen=True)
 class PacedLag:
-    """A first-order lag whose rate is linear in its pace: 1/tau = (1 - pace)/stopped + pace/running.
+    """A first-order lag with 1/tau = (1 - pace)/stopped + pace/running; the pace is a fraction of the top speed.
 
     Parameters
     ----------
@@ -151,7 +151,8 @@ class Past:
 class Mean:
     """Mean of a value over the interval that ended a number of ticks ago, in a `Recurrence`; 0: the one that ends now.
 
-    A reading represents the time since the previous one. The value before the first reading is 0, except at the start.
+    A reading is assigned to the time since the previous one. The value before the first reading is 0, except at the
+    start.
     """
 
     of: "Node"
@@ -160,7 +161,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A value that is updated at every tick of a separate clock; see `thermocomp.core.autoregressive`.
+    """A value that is updated at fixed intervals (ticks); see `thermocomp.core.autoregressive`.
 
     Between ticks it is interpolated linearly towards the next value at the mean of the inputs since the last tick.
 

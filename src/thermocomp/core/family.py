@@ -18,9 +18,9 @@ class ModelFamily(ABC):
         """Return the deviation as an expression of the clipped changes of the inputs."""
 
     def spread_expressions(self, change: Sequence[Node]) -> Sequence[Node]:  # noqa: ARG002 - of a model that is no average
-        """Return the principal directions in which the structures averaged by the model differ, as expressions.
+        """Return the principal directions in which the regressions averaged by the model differ, as expressions.
 
-        The root of the sum of their squares is the spread of the structures [unit].
+        The root of the sum of their squares is the spread of the averaged regressions [unit].
         """
         return ()
 

@@ -42,7 +42,7 @@ class _Lags(NamedTuple):
 
 
 class _Ticks(NamedTuple):
-    """A value with a clock of its own."""
+    """A value that is updated at fixed intervals (ticks)."""
 
     slots: slice
     memory: slice
@@ -52,14 +52,14 @@ class _Ticks(NamedTuple):
 
 @dataclass(frozen=True)
 class _Slot:
-    """A value before it has a place."""
+    """A value that has no position in the arrays yet."""
 
     level: int
     kind: str
     operands: tuple[Form, ...]
     numbers: tuple[float, ...] = ()
     curve: Curve | None = None
-    node: e.Lag | e.PacedLag | e.Recurrence | None = None  #: with a memory
+    node: e.Lag | e.PacedLag | e.Recurrence | None = None  #: the node, if it has a memory
 
 
 _WORK: dict[str, Callable[..., FloatArray]] = {
@@ -71,7 +71,7 @@ _WORK: dict[str, Callable[..., FloatArray]] = {
 
 
 class Layers:
-    """Expressions as layers.
+    """Expressions compiled to layers.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class Layers:
         return memory
 
     def begin_at(self, change: FloatArray, value: FloatArray) -> FloatArray:
-        """Return the memory of a machine at steady state for `change`, whose values with a clock are known, (...)."""
+        """Return the memory of a machine at steady state for `change`, with known values of its recurrences, (...)."""
         memory = self.begin(change)
         for layer in self._layers:
             if isinstance(layer, _Ticks):
@@ -237,16 +237,16 @@ class _Builder:
         return Form(((self._slots[slot], 1.0),), 0.0)
 
     def _single(self, form: Form) -> Form:
-        """Return a form of a single slot: the result of a form of several is a value of its own."""
+        """Return a form of a single slot; the result of a form of several slots becomes a new slot."""
         return form if len(form.weights) == 1 else self._value("linear", form)
 
     @property
     def exact(self) -> bool:
-        """Whether curves, which may have steps, are among the values."""
+        """True if the values include curves, which may have steps."""
         return any(s.curve is not None for s in self._slots)
 
     def lay(self) -> tuple[list[int], list[_Layer | _Lags | _Ticks], int]:
-        """Return the place of each slot, the layers in the order of computation, and the number of lags."""
+        """Return the position of each slot, the layers in the order of computation, and the number of lags."""
         groups: dict[tuple[object, ...], list[_Slot]] = {}
         for slot in sorted(self._slots, key=lambda s: s.level):
             key = (
@@ -294,7 +294,7 @@ class _Builder:
 
 
 def _places(found: list[int]) -> slice | IntArray:
-    """Return places in the memory, as a slice if they are adjacent."""
+    """Return positions in the memory, as a slice if they are adjacent."""
     adjacent = found == list(range(found[0], found[0] + len(found)))
     return slice(found[0], found[0] + len(found)) if adjacent else np.array(found, dtype=np.intp)
 
@@ -331,7 +331,7 @@ def _ticker(node: e.Recurrence) -> Ticker:
 
 
 def _regressed(node: e.Node, k: int, leaves: Sequence[e.Node]) -> e.Node:
-    """Return an expression of a tick with its past values and means as inputs."""
+    """Return the expression of a tick with its past values and means as inputs."""
 
     def leaf(node: e.Node) -> e.Node | None:
         match node:

@@ -75,7 +75,7 @@ class PacedDynamic(ErrorModel):
         n_top [1/min].
     spread : tuple of tuple of float
         Readout coefficients of the same terms (temperatures, their lags, lag by lag, and the speed states); the root of
-        the sum of the squared outputs is the spread of the structures averaged by the model [unit]; empty: unknown.
+        the sum of the squared outputs is the spread of the regressions averaged by the model [unit]; empty: unknown.
 
     Examples
     --------
@@ -206,7 +206,7 @@ class PacedDynamic(ErrorModel):
         return tuple(self.inputs[k].name for k in sorted(active))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the readout coefficient of each term; ``lag(T1, 10 min)`` is a lag (speed: at rest, at top)."""
+        """Return the readout coefficient of each term, such as ``lag(T1, 10 min)``; a speed: at rest to top speed."""
         found: dict[str, float] = {}
         for t in self.temperatures:
             name = self.inputs[t.input].name

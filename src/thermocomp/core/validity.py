@@ -1,4 +1,4 @@
-"""Conditions covered by the units on which a model was judged."""
+"""Conditions covered by the cycles, files or blocks (units) on which a model was judged."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class Validity:
-    """Conditions covered by the judged units, for which the honest error is valid.
+    """Conditions covered by the judged cycles, files or blocks (units), for which the honest error is valid.
 
     Parameters
     ----------

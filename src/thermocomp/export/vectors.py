@@ -24,7 +24,7 @@ from thermocomp.runtime.watch import RETURN, WORDS
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: values of `thermocomp.runtime.state.Status`, in the order of the block's codes
+#: values of `thermocomp.runtime.state.Status`, in the order of the block's status numbers
 STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
@@ -102,7 +102,7 @@ _UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
 
 
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value with all numbers that the exported code holds rounded, except integers; arrays at once."""
+    """Return a value with all numbers of the exported code rounded, except integers; arrays as a whole."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
@@ -118,7 +118,7 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
 
 
 def find_tolerance(tables: Tables) -> float:
-    """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
+    """Return the tolerance for exported code in double precision: feedback amplifies rounding errors.
 
     Returns
     -------

@@ -16,7 +16,8 @@ from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import find_keys, list_errors, read_text, strict_adapter
 
-#: maximum size of a file [bytes]; models of additive curves over 9,000 rows had 8 million each before thinning
+#: maximum size of a file [bytes]; additive models fitted to 9,000 rows had 8 million each before their curves were
+#: thinned
 MOST = 64_000_000
 #: maximum counts of characters in the content, so that the memory for any file is bounded
 _COUNTS = {",": 4_000_000, "[": 500_000, "{": 20_000, '"': 300_000}

@@ -149,7 +149,7 @@ AXIS: dict[str, Convert] = {
     "rapid": measure("feed"),
     "acceleration": measure("acceleration"),
 }
-#: keys that define the point from which the lever of a component in urad counts
+#: keys that define the point from which the lever of a component in urad is measured
 COUNTED_FROM = {
     "axis": ("measured_at", "measured_tool"),
     "squareness": ("reference_position",),

@@ -27,7 +27,7 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     Parameters
     ----------
     folder : Path, optional
-        Destination of the files that will be moved out: on the same disk, a move is a single step. Default: the
+        Destination of the files that will be moved out: on the same disk, a move is atomic. Default: the
         system's folder for temporary files.
     """
     folder = folder or Path(gettempdir())

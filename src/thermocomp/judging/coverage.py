@@ -1,4 +1,4 @@
-"""Conditions covered by the judged units, for which an honest error is valid, and the similarity of these units.
+"""Conditions covered by the judged cycles, files or blocks (units), and the similarity of these units.
 
 Similarity: each unit's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts of
 its duration. The squared distance of two units is the mean square difference over these parts, summed over the inputs
@@ -29,7 +29,7 @@ _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return the conditions covered by the units of a judging scheme."""
+    """Return the conditions covered by the cycles, files or blocks of a judging scheme."""
     blocks = [rows for split in judging.splits if (rows := split.judge & samples.valid).any()]
     judged = np.any(blocks, axis=0) if blocks else np.zeros(len(samples), dtype=np.bool_)
     distances = unit_distances(samples, blocks)

@@ -1,4 +1,4 @@
-"""The do-no-harm gate: accepted, unproven or refused, by independent units.
+"""The do-no-harm gate: a model is accepted, unproven or refused, by its errors in independent units.
 
 A unit is a thermal cycle or a file that the model has not seen: rows of a drift depend on each other, units do not. A
 model is better if the logarithm of the ratio of its error to that of every baseline is below zero by a one-sided t-test
@@ -34,11 +34,11 @@ NAMES = (*BASELINES, "none, both re-zeroed at the start of the block")
 REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
-#: the margin is the larger of this multiple of the probe's noise and this fraction of the largest training drift
+#: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
 TIMES_NOISE, SHARE = 3.0, 0.05
-#: cap on acceptance where noise and lost sensors were not tried
+#: reason against acceptance if the effects of noise and lost sensors were not tested
 UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
-#: a unit that moves by less than this fraction of the largest training drift is not informative
+#: a unit whose deviation changes by less than this fraction of the largest training drift is not informative
 MOVES = 0.1
 
 
@@ -119,7 +119,7 @@ class Verdict:
     names : tuple of str
         Names of the baselines.
     stated : float or None
-        Tolerated degradation as stated by the user before judging; None: by rule.
+        Tolerated degradation as set by the user before the evaluation; None: calculated by `margin_of`.
     """
 
     units: tuple[JudgedUnit, ...]
@@ -227,7 +227,7 @@ class Verdict:
 
     @property
     def advice(self) -> str:
-        """Test that would decide an unproven verdict; empty for the other verdicts."""
+        """Thermal test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
         if any("are distinct" in cap for cap in self.caps):
@@ -282,7 +282,7 @@ def measure(
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
     margin : float, optional
-        Tolerated degradation [um], stated before judging; see `margin_of`.
+        Tolerated degradation [um], set before the evaluation; see `margin_of`.
     """
     residual = measured - predicted
     size = Size.of(residual)
@@ -304,7 +304,7 @@ def measure(
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
-    """Return the verdict over the units of several verdicts; any refusal or cap applies to the whole."""
+    """Return the verdict over the units of several verdicts; each refusal or reason against acceptance applies."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
@@ -316,7 +316,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the default of the tolerated degradation in a single unit [unit]."""
+    """Return the default of the tolerated degradation in a single cycle or file [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 

@@ -58,7 +58,7 @@ def judge(
     limits : Limits or None
         Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
-        Readings that a watch, trained without the block, passes while sensors fail. Default: failures go undetected.
+        Readings that a watch, trained without the block, passes on while sensors fail. Default: failures go undetected.
     widening : ndarray of shape (n_rows,), optional
         See `replay_compensated`.
     """
@@ -147,7 +147,7 @@ def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
 
 
 def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return a cap if the units are too alike to count separately; empty if they are not."""
+    """Return a reason against acceptance if the units are too alike to count separately; empty if they are not."""
     covered = find_validity(samples, judging)
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:

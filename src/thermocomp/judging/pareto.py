@@ -22,7 +22,7 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
 
     Notes
     -----
-    Without a set better than no compensation, the choice has no sensors, and `Choice.failure` states the reason.
+    If no set is better than no compensation, no sensors are selected, and `Choice.failure` states the reason.
     """
     candidates = [Candidates.of(samples, t) for t in range(len(samples.targets))]
     most = settings.most("pareto")

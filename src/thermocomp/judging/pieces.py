@@ -69,7 +69,7 @@ def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_
 
 
 def explain(error: BaseException) -> str:
-    """Return the reason for a failure in one line; with the type of exceptions that are not of thermocomp."""
+    """Return the reason for a failure in one line, with the type of the exception if it is not one of thermocomp's."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

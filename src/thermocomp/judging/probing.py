@@ -1,4 +1,4 @@
-"""Probings of a test: their schedule and their effect."""
+"""Probings (measurements of the tool point) during a test: their schedule and their effect."""
 
 import re
 from dataclasses import dataclass, replace

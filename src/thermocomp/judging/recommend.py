@@ -1,8 +1,8 @@
-"""Recommended method: chosen anew without each unit in turn, so that the choice itself is judged.
+"""Recommended method: selected again in each fold, with the left-out cycle or file (unit) excluded.
 
-The error of a choice among methods is not the error of the method with the best result: the best of twenty is partly
-luck. Therefore the choice is repeated for every left-out unit, by the error on units left out of the others (nested
-cross-validation, Varma and Simon 2006), and the method chosen is judged on the left-out unit.
+The error of a selection among methods is not the error of the method with the best result: the best of twenty is partly
+luck. Therefore the selection is repeated for every left-out unit, by the cross-validation error on the other units
+(nested cross-validation, Varma and Simon 2006), and the selected method is judged on the left-out unit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from thermocomp.recordings.samples import Samples
 #: up to this number of units every pair is left out; above, the other units are left out in `GROUPS` groups per unit
 PAIRS = 8
 GROUPS = 3
-#: minimum number of units for a choice
+#: minimum number of units for a selection
 LEAST = 3
 
 
@@ -39,7 +39,7 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the inner splits needed to choose a method without each unit."""
+    """Return the inner splits needed to select a method with each unit left out in turn."""
     splits = judging.splits
     n = len(splits)
     if n < LEAST:
@@ -82,14 +82,14 @@ def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str,
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The recommended method for a target, and the verdict on the procedure of choosing.
+    """The recommended method for a target, and the verdict on the selection procedure.
 
     Parameters
     ----------
     chosen : tuple of str
-        Method chosen without each unit.
+        Method selected with each unit left out.
     verdict : Verdict
-        Verdict on the choice: each unit is predicted by the method chosen without it.
+        Verdict on the selection: each unit is predicted by the method selected with this unit left out.
     """
 
     target: str
@@ -110,7 +110,7 @@ def recommend(
     Returns
     -------
     Recommendation or None
-        None if there are too few units or too few methods for a choice.
+        None if there are too few units or too few methods for a selection.
     """
     if not inners or not methods:
         return None

@@ -22,14 +22,16 @@ from thermocomp.recordings.starts import Start
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules stated before judging.
+    """Rules set before the evaluation.
 
     Parameters
     ----------
     margin : float or None
-        Tolerated degradation in a single unit [unit of the target]; None: by `do_no_harm.margin_of`.
+        Tolerated degradation in a single cycle or file [unit of the target]; None: calculated by
+        `do_no_harm.margin_of`.
     primary : str or None
-        Method under test: unlike all others, its verdict is not corrected for the number of methods.
+        Primary method: its verdict is found without a correction for multiple comparisons, those of the others with
+        one.
     """
 
     margin: float | None = None
@@ -70,7 +72,7 @@ class Assessment:
     failure : str
         Reason why the method could not be fitted; empty if it could.
     caveat : str
-        Reason why the test is not honest, whatever the errors; empty if it is.
+        Reason why the result is not an honest error, such as training rows among the judged ones; empty if it is.
     overall : bool
         True for the final result of this model and target, over all judged data instead of one cycle.
     n_sensors : tuple of (int, int)

@@ -24,7 +24,7 @@ class Split:
         Name of the unseen block.
     learn, judge : ndarray of bool of shape (n_rows,)
     whole : bool
-        The gate judges the block as one unit; otherwise each thermal cycle in it.
+        The do-no-harm gate judges the block as a whole; otherwise each thermal cycle in it.
     stretch : bool
         The block continues the training data: its cycles are not independent of them.
     """
@@ -37,7 +37,7 @@ class Split:
 
     @property
     def name(self) -> str:
-        """Name of the left-out unit, without its kind."""
+        """Name of the left-out cycle, day or file, without its kind."""
         return self.block.partition(" ")[2]
 
 

@@ -72,7 +72,7 @@ class Page:
 
 @dataclass(frozen=True, kw_only=True)
 class MachineOf:
-    """Machine file used instead of models: offset and slope of each axis, for lines through one point of the volume.
+    """Machine file used instead of models: offset and slope of each axis along straight lines through one point.
 
     Parameters
     ----------

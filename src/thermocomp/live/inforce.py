@@ -48,7 +48,7 @@ class ConfirmedCorrections:
 def suspensions(
     sink: Suspending, in_force: Mapping[str, Correction], state: CompensatorState
 ) -> Iterator[tuple[str, Status | None]]:
-    """Yield targets suspended or resumed by a controller, with the resulting order; None: resumed."""
+    """Yield targets suspended or resumed by a controller, with their new status; None: resumed."""
     away = sink.suspended()
     for target in state.corrections.keys() & (in_force.keys() | away.keys()):
         order = state.orders.get(target)

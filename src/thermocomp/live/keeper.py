@@ -11,7 +11,7 @@ from thermocomp.live.clock import ServiceClock
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState, resume, silence
 
-#: reason of a target that is in shadow by configuration
+#: reason why a target runs in shadow: by configuration
 CONFIGURED = "by configuration"
 
 

@@ -25,7 +25,7 @@ KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 #: maximum magnitude of an error [um]
 _LARGEST = 1e6
-#: fields of a watch that are instants
+#: fields of a watch state that are times
 _INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
 
 

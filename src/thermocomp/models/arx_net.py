@@ -71,10 +71,10 @@ class _Net:
 class NetARX(ClockedRegressor):
     """Back-propagation net for dz(t) from dz(t-h) .. dz(t-kh) and n(t) .. n(t-mh) (P-03, E-P2).
 
-    The net is trained on measured displacements one step ahead, as in the paper, on the same clock as `ARX`; the number
-    of hidden nodes minimises the free-run error on left-out thermal cycles, which replaces the paper's trial and error.
-    Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end: it
-    cannot diverge. Raises `FitError` if there is no input or too few rows.
+    The net is trained on measured displacements one step ahead, as in the paper, at the same intervals as `ARX`; the
+    number of hidden nodes minimises the free-run error on left-out thermal cycles, which replaces the paper's trial and
+    error. Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end:
+    it cannot diverge. Raises `FitError` if there is no input or too few rows.
 
     With ``time="none"`` every row is treated as a steady state, and the net is trained with k = m = 0.
 

@@ -145,7 +145,7 @@ class MemorylessRegressor(ThermalRegressor):
     ) -> tuple[FloatArray, FloatArray, IntArray, str]:
         """Check the training data, store the range of the training rows, and return only these rows.
 
-        Also return the fold of each row and a text that describes the units left out in turn.
+        Also return the fold of each row and a text that describes what is left out in turn.
         """
         change, deviation = self._read(X, y)
         folds, description = number_folds(cycle, len(change))

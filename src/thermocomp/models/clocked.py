@@ -128,7 +128,7 @@ class Recursion(Protocol):
 
 
 class ClockedRegressor(TimedRegressor):
-    """Base of the autoregressive estimators: selection of inputs and clock by cycles."""
+    """Base of the autoregressive estimators: the inputs used, and the selection by left-out thermal cycles."""
 
     inputs: Sequence[str | int] | None
     interval_: float

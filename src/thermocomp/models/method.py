@@ -23,7 +23,8 @@ class Method:
     speed : str
         Parameter of the estimator for the names of the spindle speeds; empty if there is none.
     takes : tuple of {'dt', 'cycle'}
-        Arguments of `fit` other than X and y. With ``dt`` the method has a memory and also receives non-training rows.
+        Arguments of `fit` other than X and y. With ``dt`` the method has a memory and also receives the inputs of rows
+        not used for training.
     settings : dict of str to object
         Parameters that differ from the estimator's defaults.
     """

@@ -44,7 +44,7 @@ class HiddenCount:
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class SigmoidNet(NetRegressor):
-    """Chen's artificial neural network: i-h-o with sigmoids in hidden nodes and outputs, trained by backpropagation.
+    """Chen's neural network: sigmoids in one hidden layer and in the outputs, trained by backpropagation.
 
     Inputs and targets are scaled to 0.1 .. 0.9 (C-28), a constant channel to 0.5. Since a sigmoid stays between 0 and
     1, a prediction cannot leave the range of y by more than an eighth of that range at either end: the net saturates

@@ -30,7 +30,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
         Activation of the hidden nodes.
     solver : {'lbfgs', 'adam', 'sgd'}
     alpha : float
-        Strength of the penalty on squared weights.
+        L2 regularization strength.
     max_iter : int
         Maximum number of iterations of the solver.
     max_patterns : int

@@ -8,7 +8,7 @@ order of presentation:
 ``ours``
     Our result.
 ``holds``
-    Criterion: the name of a truth value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
+    Criterion: the name of a Boolean value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
     Default: ``holds`` among the facts of the entry; if there is none, the claim is a number for information.
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.

@@ -22,20 +22,20 @@ def tell_nobody(_: float, __: str) -> None:
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement or number of a paper, and the result here.
+    """A claim or a number of a paper, and the result here.
 
     Parameters
     ----------
     ids : tuple of str
         Identifiers of the requirements covered, such as ``C-34``.
     text : str
-        Statement of the paper, as a sentence that can be true or false.
+        Claim of the paper, as a sentence that can be true or false.
     paper : str
         Number printed in the paper, with its unit; "" if there is none.
     ours : str
         Result here.
     holds : bool or None
-        Whether the statement is true here; None: a number for information, which cannot be false.
+        Whether the claim is true here; None: a number for information, which cannot be false.
     finding : str
         Reason why it does not hold, or its limitation. Required for every claim that does not hold.
     again : tuple of bool

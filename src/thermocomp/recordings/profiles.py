@@ -90,7 +90,7 @@ class Slopes:
     remainder : float
         Residual of all states except the reference, RMS per degree of freedom [unit]; NaN if there is none.
     shared : float
-        Fraction of the error variance that is common to all states: noise of the reference.
+        Fraction of the error variance that is common to all states: noise of the reference profile.
     """
 
     powers: tuple[int, ...]

@@ -51,8 +51,8 @@ class Recording:
     changed : tuple of str
         Notes on changes of the values by a mapping.
     compensation : {'', 'off', 'known', 'unknown'}
-        Whether a correction was in force at the machine, and known; empty: not specified. See
-        `thermocomp.recordings.compensated`.
+        ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
+        have been; empty: not specified. See `thermocomp.recordings.compensated`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Contributions to the output of a paced model: a figure and a table for the page."""
+"""Contributions of the inputs to the output of a `PacedDynamic` model: a figure and a table for the page."""
 
 from typing import Any, NamedTuple
 

@@ -200,7 +200,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
 def _counted(
     deviation: FloatArray, model: ErrorModel, time: FloatArray, used: BoolArray, stands: BoolArray, anew: int
 ) -> tuple[FloatArray, int]:
-    """Return the deviations relative to the re-zero, and the row from which the correction moves again."""
+    """Return the deviations relative to the new zero, and the row from which the correction moves again."""
     own = anew + np.flatnonzero(used[anew:])
     count, known = first_rows(model.zeroing, time[own], stands[own])
     shift = float(deviation[own[:count]].mean()) if count else 0.0

@@ -282,7 +282,7 @@ class Compensator:
         failed: Mapping[str, str],
         travel: float,
     ) -> Driven:
-        """Return what the stepped models change, target by target.
+        """Return the changes by one step of the models, target by target.
 
         Parameters
         ----------

@@ -83,7 +83,7 @@ class Group:
 
 
 def _key(model: ErrorModel) -> object:
-    """Return what models have in common that can be evaluated jointly."""
+    """Return the properties that models must have in common to be evaluated jointly."""
     speeds = None if model.band is None else model.band.speeds
     return model.inputs, model.support, model.zeroing, model.remembered, speeds
 

@@ -1,4 +1,4 @@
-"""A watch applied to the values of a source: values by channel in, values by channel out."""
+"""A watch (sensor monitoring) applied to the values of a source: values by channel in, values by channel out."""
 
 import math
 from collections.abc import Mapping, Sequence

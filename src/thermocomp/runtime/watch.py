@@ -147,9 +147,9 @@ def look(
 
 
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
-    """Return the first readings; an impossible one gets the median offset of the others from the zero of the training.
+    """Return the first readings; an implausible one gets the others' median offset from the zero of the training.
 
-    Possible readings are those that the gate of the compensator accepts at a start.
+    Plausible readings are those that the gate of the compensator accepts at a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
@@ -236,7 +236,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
 
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
-    """Return changes with speeds clipped, so that one reading of 65,535 1/min does not flood the memory with heat."""
+    """Return changes with speeds clipped, so that one reading of 65,535 1/min does not add much heat."""
     most = HEATS * watch.top_speed
     calm = change.copy()
     calm[..., watch.speeds] = np.clip(calm[..., watch.speeds], -most, most)

@@ -1,9 +1,9 @@
 """Virtual machines with nonlinear joints, bearings and surfaces, in addition to the linear ones.
 
-Differences: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open and close
-(`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`), and expansion
-coefficients that increase with temperature. Each value has a source or is marked as an engineering value; none was
-tuned to the results of a method.
+Differences: film coefficients that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open
+and close (`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`), and
+expansion coefficients that increase with temperature. Each value has a source or is marked as an engineering value;
+none was tuned to the results of a method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ IN_WORK_SPACE = ("spindle_rotating", "spindle_front")
 
 @dataclass(frozen=True, eq=False)
 class NonlinearTool(RestingTool):
-    """The resting tool with films, joints and expansion that depend on its temperatures.
+    """The resting tool with film coefficients, joints and expansion that depend on its temperatures.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class NonlinearTool(RestingTool):
 
 @dataclass(frozen=True, eq=False)
 class NonlinearCentre(MachiningCentre):
-    """The machining centre with films, joints, bearings and expansion that depend on temperatures and speed.
+    """The machining centre with films, joints, bearings and expansion that depend on temperature and speed.
 
     Parameters
     ----------

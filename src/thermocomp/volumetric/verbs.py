@@ -1,4 +1,4 @@
-"""Errors along the axes and in the work volume, in Python."""
+"""Python functions for the errors along the axes and in the work volume."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

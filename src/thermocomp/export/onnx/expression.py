@@ -86,7 +86,7 @@ class Walk:
         return after
 
     def _clock(self, tick: e.Node, interval: float) -> str:
-        """Return a value that is updated at every tick: see `thermocomp.core.autoregressive`."""
+        """Return a value that is updated at fixed intervals: see `thermocomp.core.autoregressive`."""
         g, clock = self._graph, Clock(tick, interval)
         now = g.join([self.value(leaf) for leaf in clock.leaves])
         n, means = len(clock.leaves), clock.means

@@ -11,7 +11,7 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import DAY
 from thermocomp.runtime.program.tables import Tables, gather
 
-#: stated with the facts in all files
+#: limitation of the graph that all files state
 NOT_INSIDE = (
     "Not inside: averaging of the zero, the age of a reading, the watch over the sensors with what stands in for one "
     "that failed, probings"

@@ -77,7 +77,7 @@ class SourceUnit:
 
 
 def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
-    """Return a compensator in structured text, with every unit after those that it uses.
+    """Return a compensator in structured text, with every block or type after those that it uses.
 
     The code processes values as `Compensator.step` processes a reading.
     """

@@ -1,4 +1,4 @@
-"""The program in LLVM's intermediate representation, for any compensator: its variables stand in flat arrays."""
+"""The program in LLVM's intermediate representation, for any compensator: its variables are in flat arrays."""
 
 import struct
 from collections.abc import Callable, Sequence

@@ -38,7 +38,7 @@ class Level(NamedTuple):
 
     learned: int  #: number of training cycles, or speeds
     rms: float  #: mean over the unseen blocks [um]
-    error: float  #: standard error of this mean between the blocks [um]; nan with a single block
+    error: float  #: standard error of this mean over the blocks [um]; nan with a single block
 
 
 @dataclass(frozen=True, eq=False)

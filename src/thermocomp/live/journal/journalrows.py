@@ -153,9 +153,10 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
     """Return the uncompensated deviation from a measurement [um].
 
-    At the probed position the tool point is on its nominal position: the motor positions are off by minus the
-    deviation. A reported position that includes the correction therefore gives the full deviation; one without it gives
-    the residual under the correction. So the correction is subtracted once in the second case, and never in the first.
+    At the probed position the tool point is on its nominal position: the motor positions differ from their nominal
+    values by minus the deviation. A reported position that includes the correction therefore gives the full deviation;
+    one without it gives the residual under the correction. So the correction is subtracted once in the second case, and
+    never in the first.
 
     Returns
     -------

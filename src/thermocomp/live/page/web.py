@@ -103,6 +103,6 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
 
 
 async def _turn() -> None:
-    """Let the loop finish the setup of accepted connections: it takes four turns."""
+    """Let the event loop finish the setup of accepted connections, which takes four iterations."""
     for _ in range(4):
         await asyncio.sleep(0)

@@ -1,4 +1,4 @@
-"""Stepwise regression: one engine on a triangular factor, two rules.
+"""Stepwise regression on a triangular factor, with fixed thresholds on partial F or significance levels.
 
 The data are factorised once (`thermocomp.models.numerics.leastsquares.triangle`); every step then works on the small
 triangular factor. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates remain

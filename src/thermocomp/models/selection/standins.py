@@ -9,7 +9,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.structures import Moments, average, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 
-#: structures for the errors of sensor sets on left-out parts; ranking sets requires fewer than a model
+#: number of averaged regressions for the errors of sensor sets on left-out parts: fewer than for a model suffice
 _STRUCTURES = 30
 
 

@@ -128,7 +128,7 @@ class _Unroller:
         return self._read_lines[index]
 
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run one line; return None if the program continues after it."""
+        """Execute one line; return None if the program continues after it."""
         if line.flow or line.assignments:
             self._act(line)
             if line.flow:
@@ -161,7 +161,7 @@ class _Unroller:
     # -- calls -------------------------------------------------------------------------------------------------------
 
     def _call(self, frame: _Frame, line: Line, code: int) -> Generator[tuple[str, int], None, int | None]:
-        """Run M98 or M97."""
+        """Execute M98 or M97."""
         number = self._count(frame, line, "P", 0)
         told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
         if not number or len(told) > 1:
@@ -177,7 +177,7 @@ class _Unroller:
         return (yield from self._repeat(frame, line, program, place, times, None))
 
     def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run G65."""
+        """Execute G65."""
         self._act(line)
         number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
         if not number:

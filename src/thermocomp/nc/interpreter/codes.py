@@ -16,9 +16,9 @@ AXES: Final = ("X", "Y", "Z")
 #: the operator decides when the program continues
 STOPS: Final = frozenset({"M0", "M1", "M60"})
 ROTARY: Final = frozenset("ABC")
-#: words whose value is a length in a line with a motion, an offset or a cycle
+#: words whose value is a length on a line with a motion, an offset or a cycle
 LENGTHS: Final = frozenset("XYZIJKRQ")
-#: letters allowed in every line
+#: letters allowed on every line
 FREE: Final = frozenset("XYZABCFST")
 
 
@@ -259,7 +259,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
     },
 }
 
-#: letters that are refused in every line
+#: letters that are refused on every line
 REFUSED_LETTERS: Final[dict[str, str]] = {
     "U": "the axes U V W are not supported; write a dwell as G4 P, or on a Fanuc as G4 X",
     "V": "the axes U V W are not supported",

@@ -106,7 +106,7 @@ class Stored:
 
 @lru_cache(64)
 def draw_controller(seed: int, startup: str = "") -> Stored:
-    """Return a random controller; different seeds share only the codes in `startup`.
+    """Return a random controller state; states of different seeds share only the codes in `startup`.
 
     Returns
     -------

@@ -59,7 +59,7 @@ class Parameters:
         raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or explain_unset(key, self.controller)}")
 
     def assign(self, assignments: Iterable[Assignment]) -> None:
-        """Run the assignments of one line; all use the values before the line, as in LinuxCNC."""
+        """Execute the assignments of one line; all use the values before the line, as in LinuxCNC."""
         known: dict[Key, float] = {}
         for target, value, _, _ in assignments:
             key = self.key(target)

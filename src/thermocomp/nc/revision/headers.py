@@ -44,7 +44,7 @@ def describe_bound(bounds: Sequence[Bound]) -> str:
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:
-    """Return the description of the proof, including the controller states, in a given number of lines."""
+    """Return the description of the verification, including the controller states, in a given number of lines."""
     return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
 
 

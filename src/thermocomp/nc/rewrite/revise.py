@@ -29,7 +29,8 @@ from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split
 from thermocomp.nc.rewrite.text import Vector
 
 MOST_PIECES = 1000
-#: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as held
+#: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as caused by a
+#: held correction
 TELLING = 1.1
 _PLAIN = frozenset(("G0", "G1"))
 

@@ -1,6 +1,6 @@
 """Drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
 
-Program time advances in steps as short as a move; the models are stepped on a coarser clock: at least every
+Program time advances in steps as short as a move; the models are stepped at longer intervals: at least every
 `Drift.step` seconds, when the spindle speed changes, and again soon after, because part of a deviation may follow the
 speed immediately. While the inputs are constant, the results of the families of `thermocomp.core` do not depend on the
 division of time into steps.

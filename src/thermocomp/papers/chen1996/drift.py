@@ -63,7 +63,7 @@ class LearnedNet:
 
 @dataclass(frozen=True, eq=False)
 class LearnedDrift:
-    """Results of learning from the 810 sets.
+    """Models fitted to the 810 training rows, and their errors.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
 
 
 def tables(found: LearnedDrift) -> list[StudyTable]:
-    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the logs of Fig. 2 and the sweep."""
+    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the training logs of Fig. 2 and the sweep."""
     sensors = [(name, setup.SENSORS.get(name, "mean of T6 to T9"), r) for name, r in screening(found).items()]
     printed = {"x": (f" ({R2_X})", f" ({SEE_X:.1f})")}
     fits = []

@@ -61,7 +61,7 @@ class Unseen:
         ]
 
     def errors(self, test: int, target: str, method: str) -> Errors:
-        """Return the error figures of a method in a test."""
+        """Return the error metrics of a method in a test."""
         return Errors.of(self.residuals[test][target][method])
 
     def nets(self, target: str, samples: Samples) -> FloatArray:

@@ -107,7 +107,7 @@ class Computed:
     Parameters
     ----------
     fit, new : Samples
-        Training test and new tests.
+        Test used for training, and new tests.
     grouped, single : CorrelationGrouping
         At the selected threshold, and without grouping, i.e. with each temperature as a separate group.
     interval : Interval
@@ -160,7 +160,7 @@ class Computed:
 
     @cached_property
     def errors(self) -> dict[str, common.Errors]:
-        """Error figures of each model in the new tests."""
+        """Error metrics of each model in the new tests."""
         return {name: common.Errors.of(e) for name, e in self.residuals.items()}
 
 

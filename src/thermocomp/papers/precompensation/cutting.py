@@ -134,13 +134,14 @@ class Milled:
     Parameters
     ----------
     surfaces : dict of (str, str, str) to Surfaces
-        Surfaces by case, model and revision method; unrevised: `NONE` and an empty method.
+        Surfaces by case, model and revision method; of unrevised programs: `NONE` and an empty method.
     turning : float
         Share of the time during which the spindle speed of the programs equals that of the recorded tests.
     lines : int
         Number of lines of the first program.
     first : dict of str to list of (Face, ndarray)
-        Faces of the first test, cold, with their surface positions [um]; by revision method, with the net.
+        Faces of the first test, cold, with their surface positions [um]; by revision method, with the neural net as the
+        model.
     """
 
     surfaces: dict[tuple[str, str, str], Surfaces] = field(default_factory=dict)

@@ -92,7 +92,7 @@ class Computed:
     orders : list of tuple of Order
         Table of final prediction errors per position.
     hidden : list of int
-        Hidden nodes of the nets.
+        Number of hidden nodes of each neural net.
     one_step : float
         One-step-ahead RMS of least squares with k = 1, m = 0 over all positions [um].
     clocks : dict of float to (tuple of int, float, float)
@@ -129,7 +129,7 @@ class Computed:
 
     @cached_property
     def errors(self) -> dict[str, Errors]:
-        """Error figures of each model in the verification, over all positions."""
+        """Error metrics of each model in the verification, over all positions."""
         return {name: Errors.of(e) for name, e in self.left.items()}
 
     @property

@@ -44,7 +44,7 @@ class Spindle:
     Parameters
     ----------
     recordings : sequence of Recording
-        Learned and estimated recording.
+        Recording used for training, and recording to be estimated.
     peaked : MillingTrial
         Trial in which the series with the wider span is estimated: `found`, or a trial with the two series exchanged.
     """

@@ -36,7 +36,7 @@ LOOP_STEPS = 20
 
 @dataclass(frozen=True, eq=False)
 class MillingTrial:
-    """One displacement learned on some tests and estimated in another.
+    """One displacement, with a model trained on some tests and used in another.
 
     Parameters
     ----------

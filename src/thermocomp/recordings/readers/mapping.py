@@ -179,7 +179,8 @@ class Mapping:
     clean : tuple of Step
         Changes of the values read, in this order; see `thermocomp.recordings.cleaning`.
     compensation : {'', 'off', 'known', 'unknown'}
-        Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
+        ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
+        have been; empty: not specified. See `thermocomp.recordings.compensated`.
     """
 
     time: TimeColumn = TimeColumn()

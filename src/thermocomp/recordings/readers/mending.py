@@ -147,7 +147,7 @@ class Mended:
 
 
 def read_draft(mapping: str | Path | None) -> str:
-    """Return the text of an initial mapping, after validation; empty for None."""
+    """Return the text of the mapping file to start from, after validation; empty if there is none."""
     if mapping is None:
         return ""
     read_mapping(mapping)  # raises an error if it is invalid

@@ -129,7 +129,7 @@ class ParquetTable(FileTable):
 
 @contextmanager
 def _translated(path: Path) -> Iterator[None]:
-    """Convert any error that a damaged file causes in the library to a `RecordingError`."""
+    """Convert any error that a damaged file causes in the Parquet library to a `RecordingError`."""
     try:
         yield
     except InputError:

@@ -214,7 +214,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
 
 
 def _as_written(name: str, *, as_text: bool) -> str:
-    """Return a heading or a label such that reading restores it, and in text such that no spreadsheet evaluates it."""
+    """Return a heading or label to write: reading restores it, and in a text file no spreadsheet evaluates it."""
     return defuse(name) if as_text or restore(name) != name else name
 
 

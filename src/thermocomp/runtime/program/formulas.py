@@ -17,4 +17,4 @@ def models_rezeroed(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def tick(s: Kept, w: Work, t: Constants, c: Whole) -> None:
-    """Compute a value with a separate clock at its next tick."""
+    """Compute a value that is updated at fixed intervals at its next tick."""

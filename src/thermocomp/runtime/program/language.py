@@ -1,8 +1,8 @@
-"""A typed language for programs of scalars and loops that is written in Python and recorded as a tree.
+"""A typed language within Python for programs of scalars and loops, which are recorded as a tree.
 
 A function of a program runs once, with symbols instead of numbers: assignments to variables, ``with when(...)``,
 ``for k in each(...)`` and calls of other functions of the program are recorded (`thermocomp.runtime.program.tree`). A
-type checker sees numbers, integers, conditions and arrays; what it cannot see is rejected while recording.
+type checker sees numbers, integers, conditions and arrays; errors that it cannot detect are rejected while recording.
 """
 
 import inspect

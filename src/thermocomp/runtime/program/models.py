@@ -1,4 +1,4 @@
-"""Formulas of models as functions of a program: one variable per node, with lags and clocks in the state."""
+"""Formulas of models as functions of a program: one variable per node, with lags and ticks in the state."""
 
 from collections.abc import Iterable, Sequence
 from functools import reduce
@@ -19,7 +19,7 @@ from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 #: beyond every argument of a table
 _BEYOND = 1e30
-#: a larger exponent is left to a library, which may reject a negative base
+#: powers with a larger exponent are computed by a library function, which may reject a negative base
 _FACTORS = 16
 
 
@@ -177,7 +177,7 @@ class _Formula(_Arithmetic):
 
 
 class _Clock(Clock):
-    """A value with a separate clock, and the location of its past values in the arrays of the program."""
+    """A value updated at fixed intervals, and the location of its past values in the arrays of the program."""
 
     def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
         super().__init__(tick, interval)

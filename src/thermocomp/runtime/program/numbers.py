@@ -1,4 +1,4 @@
-"""Means, medians and lags as scalars and loops, in the array ``column`` of the working memory."""
+"""Means, medians and lags with scalars and loops only, in the array ``column`` of the working memory."""
 
 from thermocomp.core.zero import FAR
 from thermocomp.runtime.program.language import (

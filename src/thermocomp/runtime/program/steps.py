@@ -1,4 +1,4 @@
-"""Processing chain of a reading as scalars and loops: exported to controllers in any language.
+"""Processing chain of a reading with scalars and loops only: exported to controllers in any language.
 
 Equivalent to `thermocomp.runtime.compensator` for models whose zero is the start, without probings and commands. The
 functions are written in the language `thermocomp.runtime.program.language`, on three groups of variables: ``s``, kept

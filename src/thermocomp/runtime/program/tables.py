@@ -17,7 +17,7 @@ from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
 
-#: any number, in single precision too
+#: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
 
 

@@ -1,4 +1,4 @@
-"""Symbols of a program while it is recorded: numbers, integers, conditions and arrays that a type checker sees."""
+"""Symbols of a program while it is recorded: numbers, integers, conditions and arrays, typed for a type checker."""
 
 from abc import abstractmethod
 from typing import Any, Generic, NoReturn, Self, TypeVar, cast
@@ -47,7 +47,7 @@ class Condition(Symbol):
 
 
 class Ordered(Symbol, Generic[P]):
-    """A number or an integer, and what both can do; a plain number is made an expression."""
+    """Common operations of numbers and integers; a plain number is converted to an expression."""
 
     @staticmethod
     @abstractmethod

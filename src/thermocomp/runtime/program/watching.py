@@ -1,4 +1,4 @@
-"""Monitoring of the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
+"""Monitoring of the temperatures with scalars and loops only: see `thermocomp.runtime.watch` for explanations."""
 
 from thermocomp.core.watch import FASTER, LASTING
 from thermocomp.runtime.blame import USUAL

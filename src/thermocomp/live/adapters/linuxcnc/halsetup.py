@@ -22,7 +22,7 @@ LONGEST = 107
 
 @dataclass(frozen=True, kw_only=True)
 class HalSettings:
-    """Limits of a correction inside LinuxCNC, regardless of the service.
+    """Limits of a correction inside LinuxCNC, whatever the service sends.
 
     Parameters
     ----------

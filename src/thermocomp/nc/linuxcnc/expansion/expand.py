@@ -74,7 +74,7 @@ class _Around:
         return read(path, stored, **self.settings, **more)
 
     def controller(self, seed: int) -> Stored:
-        """Return a simulated controller; different seeds share only the specified settings."""
+        """Return the state of a simulated controller; states of different seeds share only the specified settings."""
         stored = draw_controller(seed, self.startup or "")
         return replace(stored, diameters={**stored.diameters, **self.diameters}, system=self.systems[seed])
 
