@@ -144,7 +144,7 @@ class Autoregressive(Ticking):
 
     @property
     def orders(self) -> tuple[int, int]:
-        """Orders k and m."""
+        """Orders k (past deviations) and m (past values of each input)."""
         return len(self.a), len(self.b[0]) - 1
 
     @cached_property
@@ -214,7 +214,7 @@ class AutoregressiveNet(Ticking):
 
     @property
     def orders(self) -> tuple[int, int]:
-        """Orders k and m."""
+        """Orders k (past deviations) and m (past values of each input)."""
         return self.k, self.m
 
     @property

@@ -68,7 +68,7 @@ class Band:
 
     @property
     def words(self) -> str:
-        """Name of the band in all outputs."""
+        """Short description of the band, as in all outputs."""
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 

@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import InputError
 
 @dataclass(frozen=True)
 class Constant:
-    """A number."""
+    """A constant number in an expression."""
 
     value: float
 
@@ -35,7 +35,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Clip:
-    """A value clipped to two bounds."""
+    """An expression clipped to a lower and an upper bound."""
 
     of: "Node"
     low: float
@@ -74,7 +74,7 @@ class Power:
 
 @dataclass(frozen=True)
 class Magnitude:
-    """Absolute value."""
+    """Absolute value of an expression."""
 
     of: "Node"
 
@@ -206,7 +206,7 @@ Node = (
 
 
 def scale_node(factor: float, of: Node) -> Node:
-    """Return a node multiplied by a number."""
+    """Return an expression multiplied by a number."""
     return of if factor == 1.0 else Product((Constant(factor), of))
 
 
@@ -218,7 +218,7 @@ def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float =
 
 
 def children(node: Node) -> tuple[Node, ...]:
-    """Return the expressions from which a node is computed."""
+    """Return the operands of an expression."""
     match node:
         case Constant() | Input() | Past():
             return ()

@@ -11,7 +11,7 @@ class ModelFamily(ABC):
 
     @abstractmethod
     def _check(self) -> None:
-        """Raise `InputError` if the numbers are inconsistent."""
+        """Raise `InputError` if the parameters of the model are inconsistent."""
 
     @abstractmethod
     def _expression(self, change: Sequence[Node]) -> Node:
@@ -30,7 +30,7 @@ class ModelFamily(ABC):
 
     @abstractmethod
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the coefficient of each term of `formula`."""
+        """Return the coefficient of each term in `formula`, by its name."""
 
     @property
     @abstractmethod

@@ -1,4 +1,4 @@
-"""Linear forms of values."""
+"""Linear forms: weighted sums of values plus a constant."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -61,7 +61,7 @@ class Forms:
                 self._weights[used.index(k), j] = w
 
     def evaluate(self, values: FloatArray) -> FloatArray:
-        """Return the forms, (..., n_forms), of values, (..., n_slots)."""
+        """Return the results of the forms, (..., n_forms), for values of shape (..., n_slots)."""
         found = values.take(self._slots, axis=-1)
         if not self._single:
             found = (found[..., None] * self._weights).sum(axis=-2) if self._exact else found @ self._weights

@@ -1,4 +1,4 @@
-"""Permissions that a model has from the do-no-harm gate."""
+"""Whether the do-no-harm gate permits a model to run, and to run without some of its inputs."""
 
 from collections.abc import Collection
 

@@ -133,7 +133,7 @@ class Layers:
         return memory, self._outputs.evaluate(self._run(memory, change, dt))
 
     def _run(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
-        """Advance `memory` in place; return the values of all slots."""
+        """Advance `memory` in place by one time step; return the values of all slots."""
         values = np.empty((*change.shape[:-1], self._n))
         values[..., : self.n_inputs] = change
         for layer in self._layers:
@@ -172,7 +172,7 @@ class _Builder:
         self._forms: dict[int, tuple[e.Node, Form]] = {}  #: by identity of the node, which is kept alive
 
     def form(self, node: e.Node) -> Form:
-        """Return a node as a linear form of slots."""
+        """Return the linear form of slots that computes a node of an expression."""
         known = self._forms.get(id(node))
         if known is None:
             known = self._forms[id(node)] = node, self._new_form(node)
@@ -226,7 +226,7 @@ class _Builder:
         curve: Curve | None = None,
         node: e.Lag | e.PacedLag | e.Recurrence | None = None,
     ) -> Form:
-        """Return the form of a value that is computed."""
+        """Return the linear form of the slot in which a node's value is computed."""
         if kind not in ("linear", "recurrence"):
             operands = tuple(self._single(f) for f in operands)
         level = 1 + max((self._levels[k] for f in operands for k, _ in f.weights), default=0)
@@ -300,7 +300,7 @@ def _places(found: list[int]) -> slice | IntArray:
 
 
 def _work_of(slot: _Slot, numbers: FloatArray) -> Callable[..., FloatArray]:
-    """Return the operation of a layer."""
+    """Return the array function that computes a layer."""
     if slot.kind == "power":
         (exponents,) = numbers
         return lambda of: of**exponents

@@ -307,7 +307,7 @@ class ErrorModel(Gated, ModelFamily):
 
     @cached_property
     def _reference(self) -> FloatArray:
-        """Reference of each input; NaN where the first reading decides."""
+        """Reference of each input; NaN where the first reading is the reference."""
         return np.array([np.nan if i.rezero else i.reference for i in self.inputs])
 
     @cached_property
@@ -316,7 +316,7 @@ class ErrorModel(Gated, ModelFamily):
 
     @cached_property
     def leaves(self) -> tuple[Leaf, ...]:
-        """Inputs as leaves of an expression."""
+        """Inputs of the model as leaves of an expression."""
         return tuple(Leaf(k, i.name) for k, i in enumerate(self.inputs))
 
     @cached_property

@@ -86,7 +86,7 @@ class PositionModel:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Power of q that is multiplied by each of `models`."""
+        """Power of q by which the output of each of `models` is multiplied."""
         return tuple(k for k, _ in self._by_power)
 
     def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:

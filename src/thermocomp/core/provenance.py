@@ -149,7 +149,7 @@ class HonestError:
 
     @property
     def why(self) -> str:
-        """The reason under the current rules."""
+        """Reason for the verdict under the current rules."""
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Approved by {self.taken}" if self.taken else why

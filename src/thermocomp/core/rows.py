@@ -24,7 +24,7 @@ class Stepped(Protocol):
 
     @property
     def target(self) -> str:
-        """Displacement channel that is predicted."""
+        """Displacement channel that the model predicts."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -32,7 +32,7 @@ class Stepped(Protocol):
 
     @property
     def zeroing(self) -> Zeroing:
-        """Averaging time for the reference."""
+        """Averaging time of the reference of the inputs."""
 
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed."""

@@ -128,7 +128,7 @@ class Stack:
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
     ) -> FloatArray:
-        """Return the deviations after ``hold`` and ``fade``."""
+        """Return the deviations after the support policies ``hold`` and ``fade`` outside the trained range."""
         far, outside = np.zeros(deviation.shape), clipped != change
         for k, joint, taps in self._joint:
             far[..., k] = joint.distance(change[..., taps])

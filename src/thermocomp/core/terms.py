@@ -50,7 +50,7 @@ class Variable:
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":
-        """Return the variable equal to a single input."""
+        """Return the variable that equals one of the inputs."""
         return cls(name, ((index, 1.0),))
 
     @classmethod
@@ -84,7 +84,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class TermTable:
-    """Evaluator of terms for one or many readings."""
+    """Computes the values of terms for one or many readings."""
 
     n_inputs: int
     variables: tuple[Variable, ...]

@@ -117,7 +117,7 @@ class Ticker:
 
     @staticmethod
     def _phase(memory: FloatArray) -> float:
-        """Return the time since the last tick."""
+        """Return the time since the last tick [s]."""
         clocks = memory[..., 0]
         first = float(clocks.flat[0]) if clocks.size else 0.0
         if (clocks != first).any():

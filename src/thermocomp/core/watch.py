@@ -132,12 +132,12 @@ class Watch:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the temperatures."""
+        """Names of the monitored temperatures."""
         return tuple(self.inputs[s.input].name for s in self.sensors)
 
     @cached_property
     def bank(self) -> Bank:
-        """Bank of the speed states and lags."""
+        """Lags and speed states from which temperatures are predicted."""
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
@@ -166,7 +166,7 @@ class Watch:
 
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:
-        """Indices of all pairs of sensors."""
+        """Indices of the sensors of all possible pairs."""
         first, second = np.triu_indices(len(self.sensors), 1)
         return first, second
 

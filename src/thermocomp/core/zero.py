@@ -83,7 +83,7 @@ class Gathered(NamedTuple):
         return bool(self.times) and (len(self.times) >= MOST or self.times[-1] - self.times[0] >= self._span(zeroing))
 
     def add(self, time: float, values: FloatArray, resting: bool) -> "Gathered":
-        """Return the collected readings with one more."""
+        """Return the collected readings with a further reading appended."""
         return Gathered((*self.times, time), (*self.values, values), self.resting if self.times else resting)
 
     def _span(self, zeroing: Zeroing) -> float:

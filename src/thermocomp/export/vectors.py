@@ -29,7 +29,7 @@ STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
 class Readings(NamedTuple):
-    """Readings passed to a block."""
+    """Readings of the test vectors, with their age and time steps."""
 
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
     age: FloatArray  #: (n_calls,), age of the values [s]
@@ -37,7 +37,7 @@ class Readings(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Outputs of a block."""
+    """Outputs of a compensator for the readings of the test vectors."""
 
     correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
     slope: FloatArray  #: (n_calls, n_targets) [um/m]

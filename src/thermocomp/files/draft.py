@@ -89,7 +89,7 @@ class _Move(NamedTuple):
             os.fsync(file.fileno())
 
     def keep(self) -> None:
-        """Give the old file a second name."""
+        """Give the old file a second name (hard link), so that it can be restored."""
         if _status(self.place) is None:
             return
         try:

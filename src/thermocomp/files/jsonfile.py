@@ -132,12 +132,12 @@ def _stop_at_first(schema: Any) -> None:
 
 
 def write(text: str, path: str | Path, *, overwrite: bool) -> None:
-    """Write the text of a file."""
+    """Write the text of a model file; raise `InputError` if the file exists and `overwrite` is False."""
     write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:
-    """Return the text of a file, and its name for messages."""
+    """Return the text of a model file, and its name for messages."""
     return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
 
@@ -171,7 +171,7 @@ def _parse(text: str, no: str, source: str, command: str) -> Any:
 
 
 def _found(text: str) -> str:
-    """Return a description of a text that is not JSON."""
+    """Return a description of a text that is not JSON, for an error message."""
     line = next((line.strip() for line in text.splitlines() if line.strip()), "")
     if not line:
         return "it is empty"

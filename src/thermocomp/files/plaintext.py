@@ -18,7 +18,7 @@ _MOST = 600
 
 
 def read_text(path: str | Path, what: str, most: int, failure: type[InputError] = InputError) -> str:
-    """Read a text file."""
+    """Return the text of a small UTF-8 file; raise an error that names the file and the fault."""
     source = Path(path)
     try:
         if not stat.S_ISREG(source.stat().st_mode):

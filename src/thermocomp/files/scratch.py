@@ -45,7 +45,7 @@ def is_scratch(name: str) -> bool:
 
 
 def _made(folder: Path) -> tuple[Path, int]:
-    """Return a new folder and its open lock file."""
+    """Return a new temporary folder and its open lock file."""
     while True:
         path = folder / f"{_PREFIX}{uuid4().hex}"
         path.mkdir(0o700)
@@ -74,7 +74,7 @@ def _locked(lock: int, *, wait: bool = True) -> bool:
 
 
 def _clear(folder: Path) -> None:
-    """Remove the folders of dead runs."""
+    """Remove the temporary folders of runs that have ended without removing them."""
     found: list[Path] = []
     with suppress(OSError):
         found = [p for p in folder.iterdir() if is_scratch(p.name)]

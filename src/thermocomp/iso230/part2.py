@@ -47,7 +47,7 @@ class Direction:
 
     @property
     def repeatability(self) -> FloatArray:
-        """R of each target: 4 s, (n_targets,)."""
+        """Unidirectional repeatability R at each target: 4 s, (n_targets,)."""
         return 4.0 * self.s
 
     @property

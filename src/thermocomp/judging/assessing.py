@@ -53,7 +53,7 @@ class Judged:
     starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
-        """Return one assessment per model, over all cycles."""
+        """Return the assessments of the models over all cycles, one per model."""
         return tuple(a for a in self.assessments if a.overall)
 
 
@@ -136,7 +136,7 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
 
 
 def _refused(model: ErrorModel, why: str) -> Assessment:
-    """Return the assessment of a model without data for judging."""
+    """Return the assessment of a model that cannot be judged because there are no unseen rows: refused."""
     nothing, nowhere = np.empty(0), np.empty(0, np.intp)
     return Assessment(
         model=_name(model),

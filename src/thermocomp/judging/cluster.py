@@ -190,7 +190,7 @@ class Cluster:
                     lonely = True
 
     def _ask(self) -> int:
-        """Return the number of workers."""
+        """Return the number of workers connected to the scheduler."""
         try:
             return len(self._client.nthreads(callback_timeout=ASKED))
         except Exception as e:

@@ -146,14 +146,14 @@ def _concluded(
 
 
 def _heat(samples: Samples) -> Collinearity:
-    """Return the collinearity of the temperatures."""
+    """Return the collinearity of the temperatures in all complete rows."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
 
 
 def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
-    """Return the inner splits needed for a recommendation; empty if there is no choice."""
+    """Return the inner splits for recommending a method; empty with one method only, or with a primary one."""
     choices = sum(deployable(name) for name in names)
     return inner_splits(judging) if choices > 1 and rules.primary is None else []
 
@@ -166,7 +166,7 @@ def _scores(
     jobs: int,
     progress: Callable[[str], None],
 ) -> dict[int, dict[str, list[list[float]]]]:
-    """Return the inner scores per target and eligible method."""
+    """Return the RMS on each inner split, per target and eligible method."""
     kept = [name for name in names if deployable(name)]
     pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
     found: dict[int, dict[str, list[list[float]]]] = {

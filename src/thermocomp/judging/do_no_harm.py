@@ -77,7 +77,7 @@ class JudgedUnit:
 
     @property
     def none_rms(self) -> float:
-        """RMS without compensation [um]."""
+        """RMS of the unit without compensation [um]."""
         return self.baselines[0]
 
     @property
@@ -151,7 +151,7 @@ class Verdict:
 
     @property
     def p_value(self) -> float:
-        """The decisive p-value."""
+        """P-value that decides the verdict: that for the baseline that is hardest to beat."""
         return self.p_values[self.worst] if self.p is None else self.p
 
     @property

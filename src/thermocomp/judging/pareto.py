@@ -292,7 +292,7 @@ def trade_off(found: Budget, model: str, place: int) -> str:
 
 
 def _rule(found: Budget) -> str:
-    """Return the rule for the number of sensors, with numbers."""
+    """Return the rule by which the number of sensors was selected, with its numbers, as text."""
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins

@@ -20,7 +20,7 @@ elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None]
 
 
 def return_reason(_piece: Any, why: str) -> Any:
-    """Return the reason for a failure in place of the result."""
+    """Return the reason for the failure of a task as its result."""
     return why
 
 

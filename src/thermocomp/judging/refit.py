@@ -53,7 +53,7 @@ def _not_refitted(judged: Assessment, why: str) -> Assessment:
 
 
 def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
-    """Return a method fitted to all rows, for its formula."""
+    """Return the frozen model of a method fitted to all rows."""
     return train(method, samples, target, np.ones(len(samples), dtype=np.bool_)).model
 
 

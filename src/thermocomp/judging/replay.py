@@ -237,7 +237,7 @@ def _begun(
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first readings, from which a zero is averaged."""
+    """Return the first readings of a test, which are averaged for its zero."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 

@@ -1,4 +1,4 @@
-"""Rules and results of judging."""
+"""Rules of an evaluation, and its results: `Assessment` and `Comparison`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -140,7 +140,7 @@ class Assessment:
 
     @property
     def _banded(self) -> NDArray[np.bool_]:
-        """Judged rows with a band."""
+        """Mask of the judged rows that have an uncertainty band."""
         return np.zeros(0, np.bool_) if self.half_widths is None else np.isfinite(self.half_widths)
 
     @property
@@ -153,12 +153,12 @@ class Assessment:
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
 
     def alone_metric(self, name: str) -> float:
-        """Return a metric of the model alone, without gate and limits."""
+        """Return the value of a metric for the model alone, without gate and limits."""
         alone = self.predicted if self.alone is None else self.alone
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
 
     def unprobed_metric(self, name: str) -> float:
-        """Return a metric of the compensator without probings."""
+        """Return the value of a metric for the compensator without probings."""
         return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
 
     @property
@@ -174,7 +174,7 @@ class Assessment:
         return metrics.METRICS[name](self.measured, held)
 
     def none_metric(self, name: str) -> float:
-        """Return a metric without compensation."""
+        """Return the value of a metric without compensation."""
         return (
             metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
         )

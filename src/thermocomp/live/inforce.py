@@ -22,11 +22,11 @@ class ConfirmedCorrections:
         self.confirmed = dict[str, tuple[Correction, float]]()
 
     def listens_to(self, sink: Sink) -> bool:
-        """Return whether confirmations of a sink are used."""
+        """Return whether a sink can confirm corrections and its confirmations are used."""
         return sink in self._sure
 
     def confirm(self, found: Mapping[str, Correction]) -> None:
-        """Store confirmed corrections."""
+        """Store corrections in force as confirmed by a controller."""
         self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:

@@ -27,7 +27,7 @@ SETTLED = 2000
 
 
 class _Net:
-    """A trained net with its scaling: single tick and free run."""
+    """A trained neural net with its scaling: computes one tick, or a free run."""
 
     def __init__(self, net: Perceptron, scale_in: Affine, scale_out: Affine, k: int, m: int) -> None:
         self.net, self.scale_in, self.scale_out, self.k, self.m = net, scale_in, scale_out, k, m

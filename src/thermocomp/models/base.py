@@ -132,10 +132,10 @@ class MemorylessRegressor(ThermalRegressor):
 
     @abstractmethod
     def _predict(self, change: FloatArray) -> FloatArray:
-        """Predict for checked rows, (n_rows, n_features)."""
+        """Return the prediction for validated rows, (n_rows, n_features)."""
 
     def _checked(self, X: ArrayLike) -> FloatArray:
-        """Check rows against the fitted features."""
+        """Validate rows: their features must be those of the fit."""
         check_is_fitted(self)
         change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
         return change
@@ -188,7 +188,7 @@ class StaticRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
-        """Fit to checked data, (n_rows, n_features) and (n_rows,)."""
+        """Fit to validated data, (n_rows, n_features) and (n_rows,)."""
 
 
 class CycledRegressor(MemorylessRegressor):
@@ -230,4 +230,4 @@ class CycledRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
-        """Fit to checked data; `folds` of shape (n_rows,), numbered 0, 1, ..., are left out in turn."""
+        """Fit to validated data; `folds` of shape (n_rows,), numbered 0, 1, ..., are left out in turn."""

@@ -224,7 +224,7 @@ class DynamicRidge(TimedRegressor):
         return found
 
     def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """Yield the table of all features in chunks of rows."""
+        """Yield the table of all candidate features, in chunks of rows."""
         memory = None
         for start in range(0, len(X), _CHUNK):
             own = slice(start, start + _CHUNK)

@@ -1,4 +1,4 @@
-"""A method: name, summary, and construction of its estimator."""
+"""`Method`: name and summary of a modelling method, and construction of its estimator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -38,7 +38,7 @@ class Method:
 
     @property
     def kind(self) -> type[ThermalRegressor]:
-        """Class of the estimator."""
+        """Class of the estimator, imported on first use."""
         module, _, name = self.estimator.partition(":")
         found: type[ThermalRegressor] = getattr(import_module(module), name)
         return found

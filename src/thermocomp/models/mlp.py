@@ -214,7 +214,7 @@ class SigmoidNet(NetRegressor):
         left_out: str,
         progress: Callable[[str], None] | None,
     ) -> None:
-        """Choose the number of hidden nodes (C-26)."""
+        """Select the number of hidden nodes by cross-validation (C-26)."""
         counts = sorted({int(h) for h in np.atleast_1d(np.asarray(self.hidden))})
         if not counts:
             raise InputError("hidden: no number of hidden nodes to choose from; give at least one")

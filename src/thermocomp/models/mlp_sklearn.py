@@ -1,4 +1,4 @@
-"""`mlp-sklearn`: scikit-learn's net, for comparison."""
+"""`mlp-sklearn`: scikit-learn's multilayer perceptron, for comparison."""
 
 import warnings
 from dataclasses import dataclass

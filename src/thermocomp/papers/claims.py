@@ -66,7 +66,7 @@ class Claims(Generic[_Found]):
         return tuple(claim for key in self._entries for claim in self.judged(key, found))
 
     def judged(self, key: str, found: _Found) -> list[Claim]:
-        """Return the claims of one entry, judged by the results."""
+        """Return the claims of one entry of the file, judged by the results."""
         entry = self._entries[key]
         function = self._facts.get(key)
         claims = []

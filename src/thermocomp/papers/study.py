@@ -17,7 +17,7 @@ Progress = Callable[[float, str], None]
 
 
 def tell_nobody(_: float, __: str) -> None:
-    """Report no progress."""
+    """Ignore the reported progress of a study."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class StudyTable:
-    """A table of a study."""
+    """A table of a study: caption, headings and rows."""
 
     caption: str
     header: Sequence[str]

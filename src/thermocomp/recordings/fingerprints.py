@@ -44,7 +44,7 @@ class _Scale(NamedTuple):
 
 
 class _Windows(NamedTuple):
-    """All runs of one channel at one stride, by first row."""
+    """All runs of differences of one channel at one row spacing (stride), by first row."""
 
     mark: Marks  #: hash; 0 where a value is missing
     telling: BoolArray  #: the run has enough information to be recognised

@@ -60,7 +60,7 @@ class Probing(NamedTuple):
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """Keys of the probing, or its numbers if it has none."""
+        """Keys that identify the probing; if it has none, its values."""
         return self.keys or (f"{self.deviation} um at {self.position} mm, give or take {self.repeatability} um",)
 
 
@@ -228,5 +228,5 @@ def take(
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:
-    """Return the directions with the weight of the offset appended."""
+    """Return the values of the directions, followed by a value for the offset."""
     return np.concatenate([directions, np.full((*directions.shape[:-1], 1), last)], axis=-1)

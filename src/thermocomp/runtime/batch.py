@@ -167,7 +167,7 @@ def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, Fl
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
-    """Apply the gate of the compensator to all readings."""
+    """Return which readings pass the gate of the compensator, the zero, and the rows averaged for it."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
     passed, why, known, window = complete.copy(), "", 0, list[int]()
     if np.isnan(zero).any():  # the first readings that pass determine the zero

@@ -83,7 +83,7 @@ class Compensator:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        """Models that are stepped together."""
+        """Groups of models that are evaluated together in each step."""
         return Group.of(self.models)
 
     @cached_property

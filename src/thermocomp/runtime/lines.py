@@ -25,7 +25,7 @@ class DeviationLine(NamedTuple):
 
 
 class Said(NamedTuple):
-    """Output of a line for one reading."""
+    """Output for one target or axis and one reading."""
 
     deviation: Deviation  #: including adaptation by earlier probings
     half_width: float  #: of its uncertainty band [um]; nan without a band

@@ -11,7 +11,7 @@ from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
 
 
 class Lookout:
-    """A watch, with the positions of its inputs in a reading."""
+    """A watch, with the indices of its inputs among the values of a reading."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch

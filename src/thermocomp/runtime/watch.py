@@ -199,13 +199,13 @@ def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArra
 
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
-    """Return the substitute value of a sensor, minus the reference."""
+    """Return the substitute value of each sensor, minus its reference."""
     gone = np.fmax(time - state.since, 0.0)  # 0 if not failed
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
 
 def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
-    """Check all sensors; `x` is nan where a temperature is missing."""
+    """Check all sensors and return the next state; `x` is nan where a temperature is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
     s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))

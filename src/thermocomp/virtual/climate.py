@@ -58,7 +58,7 @@ class Climate:
 
     @property
     def middle(self) -> Air:
-        """Mean state of the air."""
+        """State of the air averaged over time: mean temperature and stratification."""
         return Air(self.mean, self.layers)
 
     def init(self, rng: np.random.Generator) -> FloatArray:

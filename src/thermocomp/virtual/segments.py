@@ -68,7 +68,7 @@ class Lot:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All values that can be drawn."""
+        """All values that can be selected at random."""
         if self.between is None or self.step is None:
             return self.one_of
         return tuple(self.between[0] + k * self.step for k in range(round(self._steps) + 1))

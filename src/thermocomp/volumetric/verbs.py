@@ -64,7 +64,7 @@ class Positioned:
 
     @property
     def models(self) -> tuple[PositionModel, ...]:
-        """Models, one per component."""
+        """Position models, one per fitted component."""
         return tuple(f.fit.model.taken(self.accept_unproven) for f in self.found)
 
     def to_dict(self) -> dict[str, Any]:

@@ -196,7 +196,7 @@ def identifier(name: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that cannot end a comment."""
+    """Return a text in which nothing ends a C comment."""
     for sign in ("*/", "/*", "??"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

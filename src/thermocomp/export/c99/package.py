@@ -81,7 +81,7 @@ _COARSE = 1.0
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to C99, by name."""
     tables, said = gather(compensator), facts.lines(compensator)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)

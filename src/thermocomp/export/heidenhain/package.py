@@ -63,7 +63,7 @@ axis follows at 1 um/s), and set the datums again: a dimension that changes move
 def write_heidenhain(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last."""
+    """Return all files of the export to Heidenhain controls by name, the page of instructions last."""
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     marks = find_marks(reductions)
     most = min(math.floor(limits.magnitude), _WORD)  # in whole um

@@ -53,7 +53,7 @@ class Walk:
         self._known: dict[e.Node, str] = {}
 
     def value(self, node: e.Node) -> str:
-        """Return the name of a node's value."""
+        """Return the name of the graph value that a node of the expression has."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if (known := self._known.get(node)) is None:
@@ -110,7 +110,7 @@ class Walk:
         return g.choose(g.put("Greater", phase, EARLY * interval), onward, last)
 
     def _body(self, clock: Clock, now: str) -> Graph:
-        """Return the graph of one tick."""
+        """Return the body of the loop over ticks: the graph of one tick."""
         g = Graph(self._graph)
         n, means = len(clock.leaves), clock.means
         g.enter(g.name(), (), np.int64)

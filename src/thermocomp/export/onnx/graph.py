@@ -60,7 +60,7 @@ class _Moment:
 
 
 def translate(tables: Tables) -> GraphBlock:
-    """Return a compensator as a graph of one step."""
+    """Return a compensator as an ONNX graph that processes one reading."""
     g, n, targets = Graph(), len(tables.channels), len(tables.targets)
     places = [CLOCKS + k * targets for k in range(4)]
     value, zero, dt = g.enter("value", (n,)), g.enter("zero", (n,)), g.enter("dt")

@@ -68,11 +68,11 @@ class Graph:
         self._known: dict[object, str] = dict(outer._known) if outer else {}
 
     def name(self) -> str:
-        """Return an unused name."""
+        """Return a name that is not yet used in the graph."""
         return f"v{next(self._free)}"
 
     def enter(self, name: str, shape: tuple[int, ...] = (1,), kind: type = np.float64) -> str:
-        """Return the name of a new input."""
+        """Add an input to the graph and return its name."""
         self.inputs.append(Port(name, shape, kind))
         return name
 
@@ -99,7 +99,7 @@ class Graph:
         return name
 
     def put(self, op: str, *inputs: Value, **attributes: Any) -> str:
-        """Return the name of an operator's output."""
+        """Add an operator and return the name of its output."""
         names = tuple(map(self.constant, inputs))
         key = (op, names, repr(sorted(attributes.items())))
         if (known := self._known.get(key)) is None:
@@ -108,36 +108,36 @@ class Graph:
         return known
 
     def add(self, *terms: Value) -> str:
-        """Return a sum, evaluated from left to right."""
+        """Return the name of a sum, evaluated from left to right."""
         return self.put("Sum", *terms) if len(terms) > 1 else self.constant(terms[0])
 
     def choose(self, when: Value, this: Value, other: Value) -> str:
-        """Return one of two values, element by element."""
+        """Return the name of a value selected from two, element by element, by a condition."""
         return self.put("Where", when, this, other)
 
     def between(self, value: Value, low: Value, high: Value) -> str:
-        """Return a value clipped to two bounds."""
+        """Return the name of a value clipped to a lower and an upper bound."""
         return self.put("Min", self.put("Max", value, low), high)
 
     def every(self, conditions: str) -> str:
-        """Return whether all conditions are true."""
+        """Return the name of a condition: all given conditions are true."""
         held = self.put("ReduceMin", self.put("Cast", conditions, to=_kind(np.int64)), keepdims=1)
         return self.put("Greater", held, 0)
 
     def pick(self, of: Value, places: int | Sequence[int]) -> str:
-        """Return elements of a vector by index."""
+        """Return the name of a vector of selected elements of a vector."""
         return self.put("Gather", of, np.array(np.atleast_1d(places), dtype=np.int64), axis=0)
 
     def join(self, parts: Sequence[Value]) -> str:
-        """Return the concatenation of vectors."""
+        """Return the name of the concatenation of vectors."""
         return self.put("Concat", *parts, axis=0) if len(parts) > 1 else self.constant(parts[0])
 
     def part(self, of: str, begin: int, end: int) -> str:
-        """Return a part of a vector."""
+        """Return the name of a contiguous part of a vector."""
         return self.put("Slice", of, np.array([begin]), np.array([end]))
 
     def loop(self, trips: str, carried: Sequence[str], body: "Graph") -> list[str]:
-        """Return the final values of variables that a loop body updates."""
+        """Return the names of the final values of variables that a loop body updates."""
         left = tuple(self.name() for _ in carried)
         self.nodes.append(Node("Loop", (trips, "", *carried), left, {"body": body}))
         return list(left)
@@ -152,7 +152,7 @@ class Graph:
 
 
 def serialize(graph: Graph, name: str, facts: Sequence[str], properties: dict[str, str], version: str) -> bytes:
-    """Return the contents of the file of a graph."""
+    """Return the graph as the contents of an ONNX file."""
     from onnx import checker, helper, numpy_helper
 
     proto = graph.proto(name)

@@ -87,7 +87,7 @@ controller must not compensate for temperature itself at the same time.
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to ONNX, by name."""
     if len({m.zeroing for m in compensator.models}) > 1:
         raise InputError("the models average their zero in different ways: export each file separately")
     inside, name = without_watch(compensator), identifier(name)
@@ -104,7 +104,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
 
 
 def _properties(tables: Tables, said: list[str], facts: Facts) -> dict[str, str]:
-    """Return the metadata of the file."""
+    """Return the metadata that the ONNX file contains."""
     named = dict(line.split(": ", 1) for line in said[1:] if line.startswith(("Limits: ", "Sign: ", "Units: ", "Not ")))
     return {
         "verdict": said[0],
@@ -164,7 +164,7 @@ def _rows(tables: Tables) -> list[str]:
 
 
 def _plausible(tables: Tables, r: int) -> str:
-    """Return the range in which a value is used."""
+    """Return the plausible range of an input value as text; readings outside it are rejected."""
     t = tables.values
     least, most, low, high = t["least"][r], t["most"][r], t["low"][r] - t["room"][r], t["high"][r] + t["room"][r]
     if not t["applies"][r]:

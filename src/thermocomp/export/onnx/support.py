@@ -10,7 +10,7 @@ from thermocomp.export.onnx.nodes import Graph
 
 
 def support(g: Graph, model: ErrorModel, change: str, said: str, before: str) -> str:
-    """Return the deviation after the support policy of a model."""
+    """Return the deviation after a model's support policy, clip, hold or fade, was applied."""
     policy = model.support.policy
     if policy == "clip":
         return said

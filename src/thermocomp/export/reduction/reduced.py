@@ -44,7 +44,7 @@ SHAPES = {
 
 
 class RemainingError(NamedTuple):
-    """Residual of a deviation [um]; nan if unknown."""
+    """Size of the error that remains after compensation [um]; nan if unknown."""
 
     rms: float
     largest: float

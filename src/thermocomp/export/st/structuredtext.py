@@ -69,7 +69,7 @@ class SourceUnit:
     end: str = ""
 
     def text(self, dialect: Dialect) -> str:
-        """Return the complete source text."""
+        """Return the complete source text of the block or type."""
         if not self.end:
             return self.declaration + "\n"
         begin = ["BEGIN"] if dialect == "scl" else []
@@ -114,7 +114,7 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
 
 
 def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
-    """Return the function block."""
+    """Return the function block of the compensator."""
     mark, n = "#" if scl else "", len(tables.channels)
     outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
     kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
@@ -165,7 +165,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that cannot end a comment."""
+    """Return a text in which nothing ends a comment of structured text."""
     for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

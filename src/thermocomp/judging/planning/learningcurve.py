@@ -92,7 +92,7 @@ class LearningCurve:
 
     @property
     def words(self) -> str:
-        """Return the interpretation of the curve."""
+        """Return the interpretation of the learning curve as text."""
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"

@@ -44,7 +44,7 @@ class Json(JSONResponse):
     """
 
     def render(self, content: Any) -> bytes:
-        """Return the content as bytes; see `write_json`."""
+        """Return the content of the response as bytes; see `write_json`."""
         return write_json(content)
 
 

@@ -50,5 +50,5 @@ MakeRouter = Callable[[Board], APIRouter]
 
 
 def read_template(name: str) -> jinja2.Template:
-    """Return a template of the service's own pages."""
+    """Return the text of an HTML template of the service's own pages."""
     return jinja2.Environment(loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True).get_template(name)

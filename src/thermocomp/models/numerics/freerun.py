@@ -160,7 +160,7 @@ class _Problem:
         return [self.best_for(np.array([*some, *[0.0] * (self._k - len(some))])) for some in chosen]
 
     def best_for(self, poles: FloatArray) -> FloatArray:
-        """Return theta for given poles; the other parameters are linear."""
+        """Return theta for given poles, with the other parameters by linear least squares."""
         table = self._driven(polynomial(poles))
         scale = np.linalg.norm(table, axis=0)
         scale[scale == 0] = 1.0

@@ -54,11 +54,11 @@ class FThresholds:
             )
 
     def enter_f(self, df: int) -> float:  # noqa: ARG002
-        """Return F_E."""
+        """Return F_E, the threshold on partial F to enter."""
         return self.enter
 
     def delete_f(self, df: int) -> float:  # noqa: ARG002
-        """Return F_D."""
+        """Return F_D, the threshold on partial F to stay."""
         return self.delete
 
     def __str__(self) -> str:
@@ -164,7 +164,7 @@ class StepwiseStep:
 
     @property
     def r(self) -> float:
-        """Multiple correlation after the step."""
+        """Multiple correlation R of the model after the step."""
         return math.sqrt(max(self.r_squared, 0.0))
 
 

@@ -80,7 +80,7 @@ class StandInAnswer:
 
     @property
     def temperatures(self) -> FloatArray:
-        """Mean products of the temperatures themselves [degC^2]."""
+        """Mean products of the temperatures with each other, without their lags [degC^2]."""
         return self.gram[: self.copies.shape[1], : self.copies.shape[1]]
 
     def lose(self, made: FloatArray) -> FloatArray:

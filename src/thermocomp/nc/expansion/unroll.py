@@ -57,7 +57,7 @@ def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
 
 @dataclass(slots=True)
 class _Frame:
-    """State of a program that is being run."""
+    """State of a program or macro that is being executed."""
 
     program: Program
     variables: Variables
@@ -121,7 +121,7 @@ class _Unroller:
         return _ENDED
 
     def _read(self, index: int) -> Line | None:
-        """Return a line that may have an effect; None if it is plain."""
+        """Return a parsed line that may call, jump or set a variable; None if it is plain."""
         if index not in self._read_lines:
             text = self._texts[index]
             self._read_lines[index] = read_line(text, index + 1, "fanuc") if _MAY_ACT.search(text) else None
@@ -329,7 +329,7 @@ class _Unroller:
         return default
 
     def _act(self, line: Line) -> None:
-        """Note a line that calls, jumps or sets a variable."""
+        """Record that a line calls, jumps or sets a variable."""
         self._acted = True
         if line.optional:
             raise line.fault("an optional line (/) that calls, jumps or sets a variable: give --block-delete on")

@@ -23,7 +23,7 @@ FREE: Final = frozenset("XYZABCFST")
 
 
 class Code(NamedTuple):
-    """One code; a line can have only one code of each group."""
+    """A G or M code and its modal group; a line can have only one code of each group."""
 
     name: str  #: such as ``G38.2``
     group: str
@@ -222,7 +222,7 @@ M_CODES: Final[dict[Controller, dict[float, Code]]] = {
 
 
 def list_names(*groups: str) -> set[str]:
-    """Return the codes of modal groups, of all controllers."""
+    """Return the names of the codes in given modal groups, for all controllers."""
     tables = (*G_CODES.values(), *M_CODES.values())
     return {code.name for table in tables for code in table.values() if code.group in groups}
 

@@ -25,14 +25,14 @@ _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
 def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
-    """Interpret a program."""
+    """Yield the effect of each line of a program on the machine."""
     step = Follower(setup).step
     for line in lines:
         yield step(line)
 
 
 class Follower:
-    """Controller model that runs a program."""
+    """Model of a controller that executes a program line by line."""
 
     def __init__(self, setup: Setup) -> None:
         self.state = InterpreterState(setup)
@@ -45,7 +45,7 @@ class Follower:
         self._if_skipped: str | None = None  # motion in force if the optional lines are not run
 
     def step(self, line: Line) -> Block:
-        """Execute one line."""
+        """Execute one line and return its effect."""
         if self._ended:
             return self._idle(line)
         if line.demarcation:

@@ -14,7 +14,7 @@ _SAME_LEVEL = 1e-4
 
 
 def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Execute G0 or G1."""
+    """Execute a linear move, G0 or G1."""
     values = words.values
     rotary = state.turn(words) if "A" in values or "B" in values or "C" in values else 0.0
     if not rotary and not ("X" in values or "Y" in values or "Z" in values or "A" in values):
@@ -92,7 +92,7 @@ def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def arc(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Execute G2 or G3."""
+    """Execute an arc, G2 or G3."""
     modal, values, scale = state.modal, words.values, state.scale
     first, second, _ = PLANES[modal.plane]
     letters = CENTRE[modal.plane]

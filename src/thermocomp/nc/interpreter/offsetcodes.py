@@ -25,7 +25,7 @@ def select_system(state: InterpreterState, words: BlockWords) -> None:
 
 
 def tool_length(state: InterpreterState, words: BlockWords) -> None:
-    """Execute G43, G43.1, G43.2 or G49."""
+    """Execute a tool length offset: G43, G43.1, G43.2 or G49."""
     code = words.groups["tool length"]
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:

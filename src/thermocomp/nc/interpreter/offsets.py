@@ -20,7 +20,7 @@ EXTERNAL = 0
 
 
 def combine_known(a: Known, b: Known) -> Known:
-    """Return, per axis, whether both are known."""
+    """Return, per axis, whether it is marked as known in both arguments."""
     return (a[0] and b[0], a[1] and b[1], a[2] and b[2])
 
 
@@ -30,7 +30,7 @@ def replace_coordinates(point: Point, values: Mapping[int, float]) -> Point:
 
 
 def mark_axes(known: Known, axes: Mapping[int, object], to: bool) -> Known:
-    """Return `known` with the value of some axes replaced."""
+    """Return `known` with some axes marked as known or unknown."""
     return triple(to if i in axes else was for i, was in enumerate(known))
 
 
@@ -97,7 +97,7 @@ class Offsets:
         return self.system in self.rotations and (self.named or alike)
 
     def state(self) -> tuple[object, ...]:
-        """Return all values that can change, for comparison."""
+        """Return all offsets in force as one value, to detect changes."""
         return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
 
     def machine(self, place: Point) -> Point:

@@ -91,7 +91,7 @@ class ProgramFrame:
         self._sum = None if self.rotation else _nine(f + s for f, s in zip(self._fixed, self.shift, strict=True))
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Apply a canonical call; ignore calls of other kinds."""
+        """Update the offsets by a canonical call; calls of other kinds have no effect."""
         if kind == "g5x":
             self.system, self.origin = int(values[0]), _nine(values[1:])
         elif kind == "g92":

@@ -91,7 +91,7 @@ class Stored:
     system: int = 1
 
     def numbers(self) -> dict[int, float]:
-        """Return all parameters as stored in the controller."""
+        """Return the state as numbered parameters (#5161 and so on), as the controller stores it."""
         result = dict(self.parameters)
         result |= {5161 + i: value for i, value in enumerate(self.home28)}
         result |= {5181 + i: value for i, value in enumerate(self.home30)}

@@ -204,7 +204,7 @@ class _Reader:
         raise self.error("a number, a parameter, a function or '['")
 
     def parameter(self) -> Key:
-        """Read the key after ``#``."""
+        """Read the number or name of a parameter after ``#``."""
         marks = 0
         while self.takes("#"):
             marks += 1

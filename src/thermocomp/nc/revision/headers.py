@@ -37,7 +37,7 @@ def told_taken(taken: Sequence[str]) -> list[str]:
 
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
-    """Return the error bounds of the tool in the cuts."""
+    """Return the line about the error bounds of the tool position in the cuts."""
     return "bound " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )

@@ -41,7 +41,7 @@ Phase = Callable[[str], AbstractContextManager[Tell]]
 
 
 class Paths(NamedTuple):
-    """Output files, by content."""
+    """Paths of the output files, by content."""
 
     program: Path
     diff: Path
@@ -113,7 +113,7 @@ class Job:
 
 
 class Done(NamedTuple):
-    """Result of a job."""
+    """Result of the revision of a program."""
 
     run: Run
     bounds: tuple[Bound, ...]
@@ -282,7 +282,7 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
 
 
 def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
-    """Return the texts of the header."""
+    """Return the texts for the header of the revised program."""
     place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
     facts = [
         f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",

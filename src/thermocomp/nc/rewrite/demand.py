@@ -22,7 +22,7 @@ Field = Callable[[Point], Vector]
 
 
 class DriftSource(Protocol):
-    """Interface of a machine's drift."""
+    """Interface of the predicted drift of a machine over the time of a program."""
 
     @property
     def by_position(self) -> bool:

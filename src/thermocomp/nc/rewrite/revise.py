@@ -36,7 +36,7 @@ _PLAIN = frozenset(("G0", "G1"))
 
 
 class Revised(NamedTuple):
-    """Original line with its revision."""
+    """Original line of a program with its revised lines."""
 
     number: int  #: number of the original line; 0 for the header
     text: str  #: the original line; empty for the header
@@ -138,7 +138,7 @@ class Revision:
             yield block
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
-        """Revise a program."""
+        """Yield each line of a program with its revised lines."""
         check = Check(self.setup)
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
@@ -213,7 +213,7 @@ class Revision:
         return cut
 
     def _read(self, texts: Iterable[str]) -> Iterator[Line]:
-        """Yield the lines of a program that has not been revised before."""
+        """Yield the parsed lines of a program; raise `ProgramError` if it has been revised before."""
         for line in read_lines(recognised(texts), self.setup.controller):
             if line.comment:
                 header.refuse_revised(line)

@@ -152,7 +152,7 @@ class Drift:
         self._due = min(SOON, self.step)
 
     def _flush(self) -> None:
-        """Step the models through the time since their last step."""
+        """Advance the models by the time since their last step."""
         total, speed = self._pending, self._speed
         if self._counted:
             speed = (self._turns + (total - self._counted) * speed) / total
@@ -233,7 +233,7 @@ class Drift:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes that have a model."""
+        """Axes whose drift has a model."""
         return tuple(a for a in AXES if any(s.axis == a for s in self.stations))
 
     @property
@@ -310,7 +310,7 @@ class Drift:
 
 @dataclass(slots=True)
 class _Ladder:
-    """Stations of one axis along another axis."""
+    """Models of the drift of one axis at several positions along an axis."""
 
     axis: int
     along: int

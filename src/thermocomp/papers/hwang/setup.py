@@ -148,7 +148,7 @@ class Computed:
         return self.fit.values[:, :-1] - self.fit.values[:, -1:]
 
     def fitted(self, name: str) -> FloatArray:
-        """Return the output of a model for the training rows [um]."""
+        """Return the deviation computed by a model in the training rows [um]."""
         return common.predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
@@ -219,5 +219,5 @@ def _dynamic(tests: Sequence[Recording]) -> FloatArray:
 
 
 def named(columns: Sequence[int]) -> str:
-    """Return the sensor names of columns."""
+    """Return the names of the sensors in the given columns as text."""
     return " ".join(NAMES[k] for k in columns) or "none"

@@ -150,11 +150,11 @@ class Milled:
     first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
-        """Return the surfaces milled with the unrevised programs."""
+        """Return the surfaces milled with the original programs, without correction."""
         return self.surfaces[case, NONE, ""]
 
     def paper(self, case: str, model: str = NET) -> Surfaces:
-        """Return the surfaces of the paper's method."""
+        """Return the surfaces milled with programs revised by the paper's method."""
         return self.surfaces[case, model, program.EVERY]
 
 

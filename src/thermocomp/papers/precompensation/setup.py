@@ -123,7 +123,7 @@ class Computed:
 
     @cached_property
     def left(self) -> dict[str, FloatArray]:
-        """Residuals of the verification, (n_rows, n_positions) [um]."""
+        """Residuals of each model in the verification, (n_rows, n_positions) [um]."""
         z = self.judge.deviations
         return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
 
@@ -134,7 +134,7 @@ class Computed:
 
     @property
     def scheduled(self) -> float:
-        """RMS residual of the verification with the schedule [um]."""
+        """RMS residual of the verification with the schedule of corrections [um]."""
         return rms(self.judge.deviations + self.schedule)
 
     @cached_property
@@ -144,7 +144,7 @@ class Computed:
 
     @property
     def by_fpe(self) -> list[Order]:
-        """Orders with the smallest final prediction error, by position."""
+        """Model orders with the smallest final prediction error, by position."""
         return [min((o for o in table if o.admissible), key=lambda o: o.fpe) for table in self.orders]
 
     @property

@@ -135,7 +135,7 @@ def _fit(group: Sequence[Signal], time: FloatArray, speed: FloatArray) -> _Fits 
 
 
 def _means(time: FloatArray, values: FloatArray, good: BoolArray, edges: FloatArray) -> FloatArray:
-    """Return the mean of a signal between consecutive edges."""
+    """Return the means of a signal between consecutive times."""
     x = np.interp(time, time[good], values[good])
     area = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(time))])
     return np.asarray(np.diff(np.interp(edges, time, area)) / np.diff(edges))

@@ -101,7 +101,7 @@ def repeat_while(test: Condition) -> Iterator[None]:
 
 
 def choose(test: Condition, one: Number | float, other: Number | float) -> Number:
-    """Return one of two numbers."""
+    """Return a conditional expression: one number if a condition holds, else another."""
     pair = real(one), real(other)
     return Number(n.Conditional(common_kind(*pair), test.node, pair[0].node, pair[1].node))
 
@@ -148,7 +148,7 @@ _KNOWN: dict[str, Callable[..., object]] = {}
 
 
 def _nodes(args: Iterable[object]) -> tuple[n.Expression, ...]:
-    """Return the arguments other than the records."""
+    """Return the expressions of a call's arguments, without the records of variables."""
     return tuple(a.node for a in args if isinstance(a, Symbol))
 
 
@@ -196,7 +196,7 @@ def record(name: str) -> Iterator[n.Function]:
 
 @cache
 def find_function(name: str) -> n.Function:
-    """Return a function of the program."""
+    """Return the recorded tree of a function of the program."""
     written = _KNOWN[name]
     given: list[object] = []
     parameters: dict[str, Kind] = {}

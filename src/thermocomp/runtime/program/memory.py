@@ -40,7 +40,7 @@ ARRAYS = (*(f"{letter}{kind}" for letter in RECORDS for kind in "ri"), "at", "si
 
 @cache
 def find_places() -> dict[tuple[str, str], Location]:
-    """Return the location of each variable, by record and name."""
+    """Return the location of each variable in the flat arrays, by record and name."""
     found: dict[tuple[str, str], Location] = {}
     counts, arrays = dict.fromkeys(ARRAYS, 0), 0
     for letter, record in RECORDS.items():

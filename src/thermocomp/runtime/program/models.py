@@ -101,7 +101,7 @@ class _Arithmetic:
         self._known: dict[e.Node, Number] = {}
 
     def value(self, node: e.Node) -> Number:
-        """Return the value of a node."""
+        """Return the value of an expression's node, computed once."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if isinstance(node, e.Constant):
@@ -133,7 +133,7 @@ class _Arithmetic:
 
 
 class _Formula(_Arithmetic):
-    """Formula of models, with lags, tables and clocks."""
+    """Formula of models, with lags, tables and values updated at fixed intervals."""
 
     def __init__(self, formulas: Formulas, begun: Condition) -> None:
         super().__init__()
@@ -187,7 +187,7 @@ class _Clock(Clock):
 
 
 class _Ticking(_Arithmetic):
-    """Expression of a clock's next value."""
+    """Expression of the next value of a recurrence."""
 
     def __init__(self, clock: _Clock) -> None:
         super().__init__()

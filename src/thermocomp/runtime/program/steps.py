@@ -32,7 +32,7 @@ UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 @procedure
 def step(s: Kept, w: Work, t: Constants) -> None:
-    """Process values of a given age, and move the corrections."""
+    """Process a reading of a given age, and move the corrections."""
     tell_time(s, w, t)
     for c in each("c", t.CHANNELS):
         w.given[c] = (w.value[c] >= -1e30) & (w.value[c] <= 1e30)  # False for NaN

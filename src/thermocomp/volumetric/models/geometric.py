@@ -90,7 +90,7 @@ class ProfileFit:
 
     @property
     def words(self) -> str:
-        """Return cautions on the fit; empty if there are none."""
+        """Return cautions about the fit of the profile, as text; empty if there are none."""
         if self.leaves_more:
             return (
                 f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"

@@ -71,7 +71,7 @@ class PositionOptions:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Powers of q with modelled factors."""
+        """Powers of q whose factors are modelled."""
         return tuple(range(0 if self.offset else 1, self.slopes + 1))
 
 

@@ -69,7 +69,7 @@ class HalSettings:
 
 
 class HalSetup(NamedTuple):
-    """Result of `prepare`."""
+    """Files and settings for corrections of a machine, as returned by `prepare`."""
 
     hal: str  #: text of the HAL file
     component: str  #: text of the component

@@ -16,7 +16,7 @@ STILL = 1e-8  #: an axis that moves less is at rest [mm]
 
 
 def agree(first: float, second: float) -> bool:
-    """Return whether the values of two runs agree."""
+    """Return whether the values of two runs agree within `EQUAL`."""
     return abs(first - second) < EQUAL
 
 
@@ -84,7 +84,7 @@ class Side:
         self.program, self.machine = program, self.frame.machine(program)
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Apply an offset without moving the machine."""
+        """Apply a new offset: the machine position is unchanged, the program position changes."""
         self.frame.take(kind, values)
         self.program = self.frame.program(self.machine)
 
@@ -195,7 +195,7 @@ class OriginWriter:
         return f"G92 {' '.join(named)}" if named else f"G52 {' '.join(fixed)}" if fixed else ""
 
     def tool_length(self) -> str:
-        """Return the line that activates the tool length of both sides."""
+        """Return the line that activates the tool length in force in both runs."""
         first, second = (side.frame.length for side in self.sides)
         if not (any(first) or any(second)):
             return "G49"

@@ -161,7 +161,7 @@ class _Translated(NamedTuple):
 
     @classmethod
     def of(cls, program: Path, path: Path, setup: Setup) -> "_Translated":
-        """Write the translation of a program."""
+        """Write the translation of a Fanuc program to a file."""
         translator, sources = Translator(setup), array("i")
         with (
             program.open(encoding="latin-1", newline="") as texts,
