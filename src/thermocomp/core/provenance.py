@@ -68,7 +68,7 @@ class HonestError:
     protocol : str
         Method by which the unseen cycles were selected.
     mae, rms, max_abs : float
-        Figures of the residual over all unseen cycles [unit of the model].
+        Error metrics over all unseen cycles [unit of the model].
     none_mae, none_rms : float
         The same without compensation.
     cycles : dict of str to float

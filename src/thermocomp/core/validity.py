@@ -1,4 +1,4 @@
-"""Conditions covered by the cycles, files or blocks (units) on which a model was judged."""
+"""Conditions covered by the cycles, files or blocks on which a model was judged."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,17 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class Validity:
-    """Conditions covered by the judged cycles, files or blocks (units), for which the honest error is valid.
+    """Conditions covered by the judged cycles, files or blocks, for which the honest error is valid.
 
     Parameters
     ----------
     units : int
         Number of judged cycles, files or blocks.
     independent : int
-        Number of units, with similar ones counted once.
+        Number of these, with similar ones counted once.
     nearest : float or None
-        Distance between the two most similar units, in standard deviations of the inputs; None with a single unit.
-        Below `thermocomp.judging.coverage.ALIKE` two units count as alike.
+        Distance between the two most similar of these, in standard deviations of the inputs; None with a single one.
+        Below `thermocomp.judging.coverage.ALIKE` the two count as alike.
     speeds : tuple of float
         Spindle speeds that were run; speeds within 2 % of the largest are merged [1/min]; empty if not recorded.
     ambient : tuple of float or None
@@ -35,7 +35,7 @@ class Validity:
     Raises
     ------
     InputError
-        Fewer units than independent ones, or invalid counts or values.
+        `units` is less than `independent`, or a count or value is invalid.
     """
 
     units: int

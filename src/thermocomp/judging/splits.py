@@ -140,7 +140,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, train on all others; each file is judged as one unit."""
+    """Judge on each file in turn, train on all others; each file is judged as a whole."""
     n = len(samples.test_names)
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings, found one")
