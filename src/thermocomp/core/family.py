@@ -25,7 +25,7 @@ class ModelFamily(ABC):
         return ()
 
     def _order_memory(self, change: Sequence[Node]) -> Sequence[Node]:  # noqa: ARG002 - in the order of the expression
-        """Return the lags in the order of the memory, if it is not that of their first use."""
+        """Return the lags in the order in which the memory stores them; empty: in the order of their first use."""
         return ()
 
     @abstractmethod

@@ -163,7 +163,7 @@ class Layers:
 
 
 class _Builder:
-    """Values of expressions, each once, and their order."""
+    """Collects the values of expressions, each once, in the order of their computation."""
 
     def __init__(self, n_inputs: int) -> None:
         self._n_inputs = n_inputs

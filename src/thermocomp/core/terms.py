@@ -115,7 +115,7 @@ class TermTable:
 
     @cached_property
     def _factors(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Per degree: the terms that reach it, and the variable that is their next factor."""
+        """Per degree: the terms of at least this degree, and the variable that is their factor at this place."""
         by_degree = []
         for k in range(max((len(t) for t in self.terms), default=0)):
             rows = [i for i, t in enumerate(self.terms) if len(t) > k]
@@ -123,7 +123,7 @@ class TermTable:
         return by_degree
 
     def evaluate(self, change: FloatArray) -> FloatArray:
-        """Return the terms' values.
+        """Return the values of the terms.
 
         Parameters
         ----------

@@ -8,7 +8,7 @@ from thermocomp.runtime.compensator import Compensator
 
 @dataclass(frozen=True)
 class Facts:
-    """Origin of an export.
+    """Origin of an export: model file, version and date.
 
     Parameters
     ----------

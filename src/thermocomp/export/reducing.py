@@ -24,7 +24,7 @@ _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOrder:
-    """Export to be written.
+    """Settings of an export to be written.
 
     Parameters
     ----------

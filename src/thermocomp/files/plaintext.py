@@ -40,7 +40,7 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
 
 
 def strict_adapter(kind: type[_T]) -> TypeAdapter[_T]:
-    """Return the validator of a file's content: an unknown key, a number in quotes and NaN are errors, not guesses."""
+    """Return the validator of a file's content: an unknown key, a number in quotes and NaN are rejected."""
     return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(kind))
 
 

@@ -33,7 +33,7 @@ UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """One direction of approach.
+    """Results for one direction of approach.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ def compare(
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
 ) -> dict[str, Guard | None]:
-    """Return the readings that a watch passes in each block, with the watch trained on the block's training rows."""
+    """Return the readings that a watch passes on in each block, with the watch trained on the block's training rows."""
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
     found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
@@ -188,7 +188,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
-    """Split an assessment into its thermal cycles; results that need a separate replay stay with the whole."""
+    """Split an assessment into its thermal cycles; results that need a separate replay are not split."""
     found = []
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):

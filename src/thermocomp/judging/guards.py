@@ -31,7 +31,7 @@ class Guard:
     readings: dict[tuple[str, ...], dict[int, FloatArray]]
 
     def among(self, place: Sequence[int]) -> "Guard":
-        """Return the guard for samples with more inputs, with each column moved to its `place`."""
+        """Return the guard for samples with more inputs: `place` gives the new index of each column."""
         moved = {lost: {place[c]: v for c, v in of.items()} for lost, of in self.readings.items()}
         return Guard(self.watch, moved)
 

@@ -95,7 +95,7 @@ def _failed(found: Budget) -> str:
 
 
 def _rms(found: Budget) -> str:
-    """Return the name of the compared figure: a block's RMS, or its mean over the blocks."""
+    """Return the name of the compared metric: the RMS of a block, or its mean over the blocks."""
     if len(found.blocks) == 1:
         return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
     return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"

@@ -63,7 +63,7 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
 
 
 def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
-    """Return a method's RMS for each score of an inner split.
+    """Return the RMS of a method for each of the `scores` of an inner split.
 
     Returns
     -------

@@ -21,7 +21,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
-    """Return an assessment with the robustness of the written model, where that is worse."""
+    """Return an assessment with the robustness of the model in the model file, where that is worse."""
     if judged.robustness is None:
         return judged
     k = [t.name for t in samples.targets].index(model.target)

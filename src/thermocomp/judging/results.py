@@ -42,7 +42,7 @@ class Rules:
             raise InputError(f"margin {self.margin}: expected a finite number that is not negative")
 
     def check(self, names: Sequence[str]) -> None:
-        """Raise `InputError` if the primary method is not among those compared."""
+        """Raise `InputError` if the primary method is not among the methods compared."""
         if self.primary is not None and self.primary not in names:
             raise InputError(
                 f"primary method {self.primary!r} is not among the compared methods; compared are {', '.join(names)}"
@@ -145,7 +145,7 @@ class Assessment:
 
     @property
     def deployable(self) -> bool:
-        """Whether its method can be frozen, so that it may run at a machine."""
+        """True if the method can be frozen and may run at a machine."""
         return deployable(self.model)
 
     def metric(self, name: str) -> float:
@@ -169,7 +169,7 @@ class Assessment:
         return metrics.METRICS["rms"](self.measured, self.alone)
 
     def held_metric(self, name: str) -> float:
-        """Return a metric of probings alone, each held until the next; without probings, of no compensation."""
+        """Return a metric for compensation by probings alone, each held until the next; without probings, for none."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
         return metrics.METRICS[name](self.measured, held)
 

@@ -32,7 +32,7 @@ from thermocomp.live.adapters.sections import (
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """Web page of the service.
+    """Configuration of the web page of the service.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class _Stored:
 
 @dataclass(frozen=True)
 class Saved:
-    """A state and the time of writing.
+    """State of a compensator and the time at which it was written.
 
     Parameters
     ----------

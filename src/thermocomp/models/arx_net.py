@@ -36,7 +36,7 @@ class _Net:
         return self.scale_out(self.net.evaluate(self.scale_in(regressors)))[..., 0]
 
     def ticked(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each tick."""
+        """Return the deviation at each tick in free run from a cold start."""
         k, n = self.k, len(run.drive)
         own = np.zeros(n + k)  # preceded by k ticks at rest
         driven = ticks.regressors(np.empty(0), run.drive, np.arange(n), 0, self.m, run.drive)
@@ -48,7 +48,7 @@ class _Net:
         return own[k:]
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each row of the test."""
+        """Return the deviation at each row of the test in free run from a cold start."""
         ticked = self.ticked(run)
         return ticks.interpolate_at_rows(
             run, ticked, lambda t, now: self.tick(ticks.regressors(ticked, run.drive, t + 1, self.k, self.m, now))

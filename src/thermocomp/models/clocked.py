@@ -69,7 +69,7 @@ class Clocked:
 
     @classmethod
     def of(cls, inputs: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray, interval: float) -> "Clocked":
-        """Resample rows.
+        """Resample the rows of a test at a constant interval.
 
         Parameters
         ----------

@@ -140,7 +140,7 @@ class SigmoidNet(NetRegressor):
         cycle: ArrayLike | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> "SigmoidNet":
-        """Fit the net.
+        """Fit the neural net.
 
         Parameters
         ----------

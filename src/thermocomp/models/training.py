@@ -34,7 +34,7 @@ from thermocomp.recordings.samples import Samples
 
 @dataclass(frozen=True)
 class Trained:
-    """A fitted method.
+    """A fitted estimator and its frozen model.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ class PlotCurve:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Axes with curves.
+    """Panel of a figure: axes with curves.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ def evaluate(
     zero: Deviation,
     magnitude: float,
 ) -> Said:
-    """Return the output of a line for a reading.
+    """Return the output of a target or an axis for one reading.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ _FRICTION = ("front_bearing", "rear_bearing", "coolant")
 
 @dataclass(frozen=True, eq=False)
 class CentreState:
-    """State of the machine.
+    """Thermal state of the machining centre.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class MachiningCentre:
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
     def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
-        """Return a change of the state after a step, in addition to the reduced model; None here."""
+        """Return a change of the state after each step, in addition to the reduced model; None: there is none."""
         return None
 
     def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:

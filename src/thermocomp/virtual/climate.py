@@ -69,7 +69,7 @@ class Climate:
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of several equal steps.
+        """Return the state of the air at the end of each of several equal steps.
 
         Parameters
         ----------

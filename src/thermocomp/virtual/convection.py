@@ -23,7 +23,7 @@ GRAVITY, STEFAN_BOLTZMANN, KELVIN = 9.81, 5.670e-8, 273.15
 
 @dataclass(frozen=True)
 class Face:
-    """A surface in air.
+    """A surface cooled by air.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ LOADS = ("heater", "tip")
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """State of the tool.
+    """Thermal state of a chuck with its tool.
 
     Parameters
     ----------

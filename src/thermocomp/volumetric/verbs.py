@@ -297,7 +297,7 @@ def _several(component: Sequence[str]) -> bool:
 
 
 def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings) -> list[tuple[Profiles, ...]]:
-    """Read one component with any column names, or several from columns named after them."""
+    """Read the profile of one component from columns of any name, or of several from columns named after them."""
     given = mappings.read_mapping(s.mapping) if s.mapping is not None else None
     if _several(components):
         if s.columns or s.positions is not None or s.layout == "long":

@@ -129,7 +129,7 @@ void {name}_step({name}_state *s, const tc_real value[{n}], double age, double d
 
 @dataclass(frozen=True)
 class Sources:
-    """A compensator in C.
+    """Source and header of a compensator in C99.
 
     Parameters
     ----------

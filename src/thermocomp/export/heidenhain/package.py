@@ -115,7 +115,7 @@ def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
 
 
 def formula(r: Reduced, marks: dict[str, str], *, word: bool = False) -> str:
-    """Return a formula to be appended to a dimension; the correction is in um for a `word`."""
+    """Return a formula as text: in mm, to be appended to a dimension of the machine, or in um for a TNC 360 `word`."""
     sign, number = (-1, in_um) if word else (1, in_mm)
     text = _signed(number(sign * r.model.intercept)) if r.model.intercept else ""
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):

@@ -153,7 +153,7 @@ def _readme(compensator: Compensator, tables: Tables, name: str, said: list[str]
 
 
 def _rows(tables: Tables) -> list[str]:
-    """Return a table row with the meaning of each value."""
+    """Return table rows with the meaning of each input value."""
     rows, t = list[str](), tables.values
     for k, c in enumerate(tables.channels):
         of = [r for r in range(len(tables.ranges)) if t["channel"][r] == k]

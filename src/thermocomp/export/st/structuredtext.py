@@ -53,7 +53,7 @@ END_FOR;
 
 @dataclass(frozen=True)
 class SourceUnit:
-    """A block or a type.
+    """Source text of a block or a type.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The block's functions in structured text (IEC 61131-3), in the dialects of CODESYS, TwinCAT and Siemens SCL."""
+"""Functions of the block in structured text (IEC 61131-3), in the dialects of CODESYS, TwinCAT and Siemens SCL."""
 
 import re
 import textwrap

@@ -26,7 +26,7 @@ from thermocomp.virtual.protocolfile import read_protocol
 
 @dataclass(kw_only=True)
 class Played:
-    """Rows of a recording, played back at their times.
+    """Source of readings that plays back the rows of a recording at their times.
 
     Parameters
     ----------

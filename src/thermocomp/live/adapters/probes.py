@@ -19,7 +19,7 @@ from thermocomp.live.adapters.plain import SimulatedSource
 
 @dataclass(kw_only=True)
 class MqttProbe(Broker):
-    """Measurements from a topic; messages retained by the broker are ignored, so that none is used twice."""
+    """Source of measurements from an MQTT topic; ignores messages retained by the broker: none is used twice."""
 
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)

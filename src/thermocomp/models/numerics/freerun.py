@@ -35,7 +35,7 @@ class Coefficients:
     intercept: float = 0.0
 
     def ticked(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each tick, (n_ticks + 1,)."""
+        """Return the deviation at each tick in free run from a cold start, (n_ticks + 1,)."""
         products = self.b @ run.drive.T
         driven = products[0] + self.intercept
         for i in range(1, len(self.b)):
@@ -49,7 +49,7 @@ class Coefficients:
         return value
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each row of the test."""
+        """Return the deviation at each row of the test in free run from a cold start."""
         ticked = self.ticked(run)
         k, m = len(self.a), len(self.b) - 1
         return ticks.interpolate_at_rows(

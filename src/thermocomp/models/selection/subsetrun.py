@@ -76,7 +76,7 @@ def run(
     seconds: float | None,
     progress: Callable[[str], None] | None,
 ) -> SearchResult:
-    """Run the search.
+    """Search the best subsets of each size.
 
     Parameters
     ----------

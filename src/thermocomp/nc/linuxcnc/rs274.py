@@ -42,7 +42,7 @@ class ArcPath(NamedTuple):
 
 
 class Canonical(NamedTuple):
-    """One canonical call.
+    """One canonical call of the interpreter.
 
     `kind` is ``rapid``, ``feed``, ``arc``, ``probe``, ``tap``, ``curve`` for moves, else ``dwell`` (s),
     ``feedrate`` (F converted to mm, F as programmed), ``feedmode`` (spindle, 1 for G95), ``unit`` (mm per unit of

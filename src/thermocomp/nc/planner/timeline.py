@@ -197,7 +197,7 @@ class _Plan:
         self.chained = (serial, move, block)
 
     def _near(self, end: Point) -> bool:
-        """Return whether a line to this end passes close to all points of the chain."""
+        """Return whether a straight line to this end passes close to all points that it would replace."""
         chain, most = self.chain, self.straight * self.straight
         if len(chain) > CHAIN:
             return False

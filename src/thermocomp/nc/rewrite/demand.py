@@ -131,7 +131,7 @@ class Left:
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
     def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> CutErrors:
-        """Add a cut.
+        """Add the samples of a cut; return its errors.
 
         Parameters
         ----------

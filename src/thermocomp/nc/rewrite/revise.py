@@ -55,7 +55,7 @@ class Revised(NamedTuple):
 
 @dataclass
 class Revision:
-    """Revision of one program.
+    """Revises one program, block by block.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ class Revision:
         )
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return the change of a block, and the corrections along its path."""
+        """Return the revised lines of a block, and the corrections along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]

@@ -132,7 +132,7 @@ class Wiring:
 
 
 def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, InputSignal]:
-    """Read the constants given by the user.
+    """Read the inputs to which the user assigned constant values.
 
     Parameters
     ----------

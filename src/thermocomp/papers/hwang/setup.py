@@ -1,9 +1,9 @@
 """Computation of the study of Hwang, Lee and Yang; `thermocomp.papers.hwang.redo` presents it.
 
-One test of six hours in three states drawn at random, 14 sensors, drift Z. T14 (bed) is the reference: each variable is
-``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper is
-unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all others.
-The performance on new tests, with other orders of the states and other weather, is reported in addition.
+One test of six hours in three states selected at random, 14 sensors, drift Z. T14 (bed) is the reference: each variable
+is ``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper
+is unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all
+others. The performance on new tests, with other orders of the states and other weather, is reported in addition.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ SAME = 1.1
 
 @dataclass(frozen=True)
 class PaperFit:
-    """A model and its goodness of fit.
+    """A model with R2 and standard error in its training rows.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def agreement(groups: Groups) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of Hwang.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ class Changing(Climate):
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of several equal steps, see `Climate.air`.
+        """Return the state of the air at the end of each of several equal steps, see `Climate.air`.
 
         Parameters
         ----------

@@ -81,7 +81,7 @@ class Warm:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of precompensation.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ class Thinned:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of stepwise2017.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Wessel's section III: the finite-element spindle, learned in one speed regime, estimated in another."""
+"""Wessel's section III: the finite-element spindle; models are trained in one speed regime and used in another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

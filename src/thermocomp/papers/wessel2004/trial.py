@@ -47,7 +47,7 @@ class MillingTrial:
     estimates : dict of str to ndarray of shape (n_unseen,)
         Estimates in the unseen test, by method [um].
     fits : dict of str to ndarray of shape (n_learned,)
-        Estimates in the training tests, by method [um].
+        Estimates in the tests used for training, by method [um].
     flagged : ndarray of bool of shape (n_unseen,)
         Whether a temperature is outside the training range: the guard of the frozen model.
     """
@@ -90,7 +90,7 @@ class MillingTrial:
         return rms(self.residual(method))
 
     def fit_rms(self, method: str) -> float:
-        """Return the root mean square of the residual of one of `fits` in the training tests [um]."""
+        """Return the root mean square of the residual of one of `fits` in the tests used for training [um]."""
         return rms(self.learned.deviations[:, 0] - self.fits[method])
 
     def numbers(self, prefix: str) -> dict[str, float]:

@@ -68,7 +68,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 
 
 def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = None) -> dict[str, BoolArray]:
-    """Return the rows in which a channel is in trouble while its other rows are sound.
+    """Return the rows in which a channel is faulty while its other rows are sound.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _probed(recording: Recording) -> set[str]:
 def _channel(
     channel: Channel, values: FloatArray, time: FloatArray, moved: BoolArray, *, probed: bool
 ) -> tuple[Signal, list[Finding]]:
-    """Return the sound part of a channel, and all findings of this channel alone."""
+    """Return the sound values of a channel, and the findings for which no other channel is needed."""
     least, most = PLAUSIBLE.get(channel.quantity, (-np.inf, np.inf))
     plausible = (values >= least) & (values <= most)
     coded = _coded(channel, values, plausible)

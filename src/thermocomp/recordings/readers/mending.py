@@ -187,7 +187,7 @@ def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording
 
 
 def located(finding: Finding, recording: Recording, mapping: Mapping, headings: Sequence[str]) -> Remedy:
-    """Return the remedy of a finding in the form required by a mapping of the file."""
+    """Return the correction for a finding, as an entry of the mapping of its file."""
     remedy: dict[str, Any] = copy.deepcopy(dict(finding.remedy or {}))
     for step in remedy.get("clean", ()):
         if "times" in step:

@@ -53,7 +53,7 @@ def when(test: Condition) -> Iterator[None]:
 
 
 def _last_branch() -> n.If:
-    """Return the last branch of the present block, at the end of its chain."""
+    """Return the last branch of the ``if`` chain that ends the current block of statements."""
     last = TRACE.get().blocks[-1][-1]
     while isinstance(last, n.If) and last.other:
         last = last.other[0]

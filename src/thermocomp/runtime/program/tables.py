@@ -1,4 +1,4 @@
-"""Numbers of a compensator, as constants of its program: see `thermocomp.runtime.program.variables`."""
+"""Numbers of a compensator as constants of its program: see `thermocomp.runtime.program.variables`."""
 
 from typing import Any, NamedTuple
 

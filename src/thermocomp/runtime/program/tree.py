@@ -62,7 +62,7 @@ class Real:
 
 @dataclass(frozen=True)
 class Operation:
-    """Two values combined by an operator; ``and`` and ``or`` evaluate the second only if it decides."""
+    """Two values combined by an operator; ``and`` and ``or`` evaluate the second only if the first does not decide."""
 
     kind: Kind
     operator: Operator

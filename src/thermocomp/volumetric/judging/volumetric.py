@@ -316,7 +316,7 @@ def _largest(states: ThermalStates, tool: Vector) -> int:
 
 
 def _rows(time: FloatArray, largest: int, hours: Sequence[float]) -> Iterator[tuple[str, int]]:
-    """Yield the moments to evaluate with their labels, each row once."""
+    """Yield the labels and rows of the states to be evaluated, each row once."""
     if len(time) == 1:
         yield "reference state", 0
         return

@@ -28,7 +28,7 @@ LEVEL = 0.01
 
 @dataclass(frozen=True)
 class Tried:
-    """A candidate profile.
+    """A candidate for the profile of an error component.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Expansion:
-    """Output of `expand`.
+    """Plain program written by `expand`.
 
     Parameters
     ----------

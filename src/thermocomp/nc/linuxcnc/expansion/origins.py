@@ -74,7 +74,7 @@ class Side:
         self.rotations = {i: stored.rotations.get(i, 0.0) for i in stored.origins}
 
     def begin(self, call: Canonical) -> None:
-        """Process a call before the first line."""
+        """Process a call that precedes the first line of the program."""
         self.take(call.kind, call.values)
         if call.kind == "rapid":
             self.move(call.program)

@@ -112,7 +112,7 @@ class Writer(OriginWriter):
     def release(  # noqa: PLR0911
         self, held: Canonical, other: Canonical, a: Canonical, b: Canonical
     ) -> tuple[list[tuple[str, str]], bool]:
-        """Return (kind, text) of a pair held back, and whether the next pair belongs to it."""
+        """Return the lines (kind, text) for a pair of calls held back, and whether the next pair is merged into it."""
         kind, close = held.kind, a.line == held.line
         if kind == "g5x":
             if a.kind == "g92" and close and self.unshifted(a, b):

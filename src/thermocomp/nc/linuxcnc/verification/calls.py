@@ -67,13 +67,13 @@ class Calls:
         return Calls(**{name: column[which] for name, column in vars(self).items()})
 
     def then(self, others: "Calls") -> "Calls":
-        """Return these calls followed by others."""
+        """Return these calls, followed by other calls."""
         pairs = zip(vars(self).items(), vars(others).values(), strict=True)
         return Calls(**{name: np.concatenate((mine, more)) for (name, mine), more in pairs})
 
 
 class Side:
-    """One run of the interpreter.
+    """Calls of one run of the interpreter, prepared for comparison with the other run.
 
     Parameters
     ----------
