@@ -163,7 +163,7 @@ class Layers:
 
 
 class _Builder:
-    """Collects the values of expressions, each once, in the order of their computation."""
+    """Builder of layers: collects the values of expressions, each once, in the order of their computation."""
 
     def __init__(self, n_inputs: int) -> None:
         self._n_inputs = n_inputs

@@ -26,7 +26,8 @@ class Validity:
     ambient_channel : str
         Channel of the ambient temperature; empty if there is none.
     start : tuple of float or None
-        Minimum and maximum of the mean of all temperatures at the start of a unit [degC]; None without temperatures.
+        Minimum and maximum of the mean of all temperatures at the start of a judged cycle, file or block [degC]; None
+        without temperatures.
     days : int
         Number of calendar days with judged rows; 0 if the recordings have no time stamps.
     hours : float

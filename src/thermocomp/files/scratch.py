@@ -1,7 +1,7 @@
 """Temporary working folders; those left by a killed run are removed by the next run.
 
 Each folder has a file that the run locks for its lifetime, and the system releases the lock however the run ends: if
-the lock can be acquired, the run is dead and the folder is removed.
+the lock can be acquired, the run has ended and the folder is removed.
 """
 
 import os

@@ -55,7 +55,7 @@ class Revised(NamedTuple):
 
 @dataclass
 class Revision:
-    """Revises one program, block by block.
+    """Revision of one program, block by block.
 
     Parameters
     ----------
