@@ -23,21 +23,21 @@ from thermocomp.core.network import Affine, Perceptron
 from thermocomp.core.state import State
 from thermocomp.core.ticker import companion
 
-#: smallest admissible 1 - sum(a); the settled deviation is the drive divided by it
+#: smallest admissible 1 - sum(a); the steady-state deviation is the contribution of the inputs divided by it
 SETTLES = 1e-9
 
 
 def find_largest_root(a: ArrayLike) -> float:
-    """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; below 1, the free run is stable."""
+    """Return the largest modulus of the roots of z^k - a_1 z^(k-1) - ... - a_k; the free run is stable if below 1."""
     roots = np.linalg.eigvals(companion(np.asarray(a, dtype=np.float64)))
     return float(np.abs(roots).max(initial=0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ticking(ErrorModel):
-    """Common part of the autoregressive families: the clock and the memory.
+    """Common part of the autoregressive families: the time steps (ticks) and the memory.
 
-    The runs of a batch share one clock.
+    All runs of a batch have their ticks at the same times.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class Autoregressive(Ticking):
 
     @property
     def orders(self) -> tuple[int, int]:
-        """Orders k and m."""
+        """Orders k (past deviations) and m (past values of each input)."""
         return len(self.a), len(self.b[0]) - 1
 
     @cached_property
@@ -214,7 +214,7 @@ class AutoregressiveNet(Ticking):
 
     @property
     def orders(self) -> tuple[int, int]:
-        """Orders k and m."""
+        """Orders k (past deviations) and m (past values of each input)."""
         return self.k, self.m
 
     @property

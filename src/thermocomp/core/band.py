@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 #: minimum number of cycles for a distribution-free band; with fewer, the required quantile exceeds the largest error
 CONFORMAL = 9
-#: largest half-width where the structures agree [unit]
+#: largest half-width where the averaged regressions agree [unit]
 WIDEST = 1e6
 
 
@@ -22,21 +22,21 @@ WIDEST = 1e6
 class Band:
     """Half-width of the band about a model output, fixed when the model was fitted.
 
-    The half-width is ``factor * sqrt(floor^2 + spread^2)``. The spread is the disagreement of the structures averaged
-    by the model where the training data do not determine the output. Inputs are clipped, so the spread does not grow
-    beyond their range.
+    The half-width is ``factor * sqrt(floor^2 + spread^2)``. The spread is the standard deviation between the
+    regressions that the model averages; it is large where the training data do not determine the output. Inputs are
+    clipped, so the spread does not grow beyond their range.
 
     Parameters
     ----------
     level : float
         Fraction of the rows of unseen thermal cycles that the band is designed to contain.
     basis : {'assumption', 'conformal'}
-        ``assumption``: errors are normal, fully correlated within a cycle, and their size is estimated from this number
-        of cycles; ``conformal``: distribution-free, assuming that the cycles are exchangeable.
+        ``assumption``: errors are normally distributed, fully correlated within a cycle, and their size is estimated
+        from `cycles` cycles; ``conformal``: distribution-free, assuming that the cycles are exchangeable.
     cycles : int
         Number of thermal cycles the band is based on, each left out in turn.
     floor : float
-        Smallest half-width, used where the structures agree [unit].
+        Smallest half-width, used where the averaged regressions agree [unit].
     running, stopped : float
         Factor while the spindle turns, and while it is stopped [-].
     speeds : tuple of int
@@ -68,12 +68,12 @@ class Band:
 
     @property
     def words(self) -> str:
-        """Name of the band in all outputs."""
+        """Short description of the band, as in all outputs."""
         by = "by assumption" if self.basis == "assumption" else "conformal"
         return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
 
     def tell(self, unit: str) -> str:
-        """Return the band as text in a given unit, with its half-widths where the structures agree."""
+        """Return the band as text in a given unit, with its half-widths where the averaged regressions agree."""
         rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
         if not self.speeds:
             rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
@@ -91,7 +91,7 @@ class Band:
         change : ndarray of shape (..., n_inputs)
             Inputs minus their reference [their units].
         spread : ndarray of shape (...,)
-            Spread of the structures [unit].
+            Spread of the averaged regressions [unit].
 
         Returns
         -------

@@ -18,7 +18,7 @@ from thermocomp.core.exceptions import SettingError
 
 FloatArray = NDArray[np.float64]
 
-#: largest coefficient, weight, gain, threshold, curve value or intercept: a micrometre per 1e-15 of an input [-]
+#: largest coefficient, weight, gain, threshold, curve value or intercept, such as 1 um per 1e-15 of an input [-]
 COEFFICIENT = 1e15
 #: largest reference or end of a trained range in house units: 1,000 km, 1e9 1/min, a time stamp
 RANGE = 1e9
@@ -61,7 +61,7 @@ _CEILINGS = np.array([1.0 - LEAST, READING, COEFFICIENT, MEMORY, _LARGEST])
 def round_within(
     values: ArrayLike, least: float | FloatArray = -_LARGEST, most: float | FloatArray = _LARGEST
 ) -> FloatArray:
-    """Return the nearest single-precision numbers within bounds."""
+    """Return the single-precision numbers nearest to the given ones that lie within the bounds."""
     with np.errstate(over="ignore", under="ignore"):
         near = np.clip(np.asarray(values, dtype=np.float64), least, most).astype(np.float32)
         above, below = (np.nextafter(near, np.float32(end)) for end in (np.inf, -np.inf))
@@ -114,7 +114,7 @@ def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
 
 
 def check_between(owner: str, least: float, most: float, **numbers: Any) -> None:
-    """Reject numbers outside two bounds."""
+    """Reject numbers outside a lower and an upper bound."""
     wrong = []
     for name, values in numbers.items():
         table = np.asarray(values, dtype=np.float64).ravel()

@@ -26,7 +26,7 @@ class Columns(Protocol):
 
 
 def read_column(table: Columns, name: str, owner: str) -> NDArray[Any]:
-    """Return a column; raise `InputError` if it does not exist."""
+    """Return a column of a table by name; raise `InputError` if it does not exist."""
     try:
         return np.asarray(table[name])
     except (KeyError, ValueError, IndexError, TypeError) as e:

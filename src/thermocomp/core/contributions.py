@@ -1,4 +1,4 @@
-"""Contributions to the output of a paced model: each input with its lags, and its gain."""
+"""Contributions of the inputs, with their lags, to the output of a `PacedDynamic` model, and their gains."""
 
 from typing import NamedTuple
 

@@ -65,12 +65,12 @@ class Curve:
 
     @property
     def constant(self) -> bool:
-        """True if the variable has no effect."""
+        """True if the curve has the same value everywhere."""
         return min(self.y) == max(self.y)
 
     @property
     def span(self) -> float:
-        """Maximum minus minimum value."""
+        """Maximum minus minimum value of the curve."""
         return max(self.y) - min(self.y)
 
     def expression(self, of: Node, name: str) -> Lookup:

@@ -73,7 +73,7 @@ class RecordingError(InputError):
 
 
 class TwoReadingsError(RecordingError):
-    """The times of a recording can be read in several ways with different durations; the program must not guess."""
+    """The times of a recording can be interpreted in several ways with different durations; the user must choose."""
 
 
 class UnitError(InputError):
@@ -110,7 +110,7 @@ class FitError(ThermocompError):
 
 
 class ReadingError(ThermocompError):
-    """A live reading cannot be used; the correction is held, never moved."""
+    """A live reading cannot be used; the correction is held at its present value."""
 
 
 class MissingExtraError(ThermocompError):

@@ -11,9 +11,9 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.watch import LASTING, Watched
 
-#: undetected drift of a sensor from which a spare sensor is recommended [degC]
+#: a spare sensor is recommended if a larger drift of a sensor may stay undetected [degC]
 FAR = 3.0
-#: the same for the error with the substitute value, as a multiple of the error with all sensors
+#: a spare sensor is recommended above this ratio of the error with the substitute value to that with all sensors
 DEAR = 2.0
 #: arbitrary time constant or time step; settled values do not depend on it [s]
 _ANY = 60.0
@@ -36,14 +36,14 @@ class SensorExplanation:
         The input is predicted from the others and the spindle speed; a failure is detected by the difference, and the
         prediction replaces the reading.
     jump, off, moved : float or None
-        Limits: change within `pace`, difference from the prediction, change of the prediction while the reading is
-        constant [degC].
+        Limits of the change within `pace`, of the difference from the prediction, and of the change of the prediction
+        while the reading is constant [degC].
     pace : float or None
         [s]
     still : float or None
         Longest constant reading while another input changes [s]; None: time alone is not a criterion.
     unseen : float or None
-        RMS error of the prediction in cycles that were left out [degC].
+        Cross-validation error (RMS) of the prediction, on left-out cycles [degC].
     undetected : float or None
         Effect of an undetected drift up to `off` on the output of the model, once settled [unit of the model].
     lost : float or None
@@ -99,7 +99,7 @@ class Explanation:
     covered : str
         Conditions covered by the judged cycles; empty if unknown.
     pairs : tuple of int
-        Number of sensor pairs whose joint failure was judged, and of those after whose failure the correction
+        Number of sensor pairs whose simultaneous failure was tested, and number of these for which the correction
         continues.
     """
 

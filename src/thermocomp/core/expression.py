@@ -13,7 +13,7 @@ from thermocomp.core.exceptions import InputError
 
 @dataclass(frozen=True)
 class Constant:
-    """A number."""
+    """A constant number in an expression."""
 
     value: float
 
@@ -35,7 +35,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Clip:
-    """A value clipped to two bounds."""
+    """An expression clipped to a lower and an upper bound."""
 
     of: "Node"
     low: float
@@ -74,7 +74,7 @@ class Power:
 
 @dataclass(frozen=True)
 class Magnitude:
-    """Absolute value."""
+    """Absolute value of an expression."""
 
     of: "Node"
 
@@ -123,7 +123,7 @@ class Lag:
 
 @dataclass(frozen=True)
 class PacedLag:
-    """A first-order lag whose rate is linear in its pace: 1/tau = (1 - pace)/stopped + pace/running.
+    """A first-order lag with 1/tau = (1 - pace)/stopped + pace/running; the pace is a fraction of the top speed.
 
     Parameters
     ----------
@@ -151,7 +151,8 @@ class Past:
 class Mean:
     """Mean of a value over the interval that ended a number of ticks ago, in a `Recurrence`; 0: the one that ends now.
 
-    A reading represents the time since the previous one. The value before the first reading is 0, except at the start.
+    A reading is assigned to the time since the previous one. The value before the first reading is 0, except at the
+    start.
     """
 
     of: "Node"
@@ -160,7 +161,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A value that is updated at every tick of a separate clock; see `thermocomp.core.autoregressive`.
+    """A value that is updated at fixed intervals (ticks); see `thermocomp.core.autoregressive`.
 
     Between ticks it is interpolated linearly towards the next value at the mean of the inputs since the last tick.
 
@@ -205,7 +206,7 @@ Node = (
 
 
 def scale_node(factor: float, of: Node) -> Node:
-    """Return a node multiplied by a number."""
+    """Return an expression multiplied by a number."""
     return of if factor == 1.0 else Product((Constant(factor), of))
 
 
@@ -217,7 +218,7 @@ def sum_weighted(weights: Sequence[float], of: Sequence[Node], constant: float =
 
 
 def children(node: Node) -> tuple[Node, ...]:
-    """Return the expressions from which a node is computed."""
+    """Return the operands of an expression."""
     match node:
         case Constant() | Input() | Past():
             return ()

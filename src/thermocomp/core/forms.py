@@ -1,4 +1,4 @@
-"""Linear forms of values."""
+"""Linear forms: weighted sums of values plus a constant."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from thermocomp.core.arrays import FloatArray
 class Form(NamedTuple):
     """A linear form: constant + sum of weight * value."""
 
-    weights: tuple[tuple[int, float], ...]  #: by slot
+    weights: tuple[tuple[int, float], ...]  #: (slot of a value, weight)
     constant: float
 
     def scaled(self, factor: float) -> "Form":
@@ -19,7 +19,7 @@ class Form(NamedTuple):
         return Form(tuple((k, factor * w) for k, w in self.weights), factor * self.constant)
 
     def moved(self, places: Sequence[int]) -> "Form":
-        """Return the form with each slot at its place."""
+        """Return the form with its slots renumbered."""
         return Form(tuple((places[k], w) for k, w in self.weights), self.constant)
 
 
@@ -39,7 +39,8 @@ class Forms:
     ----------
     forms : sequence of Form
     exact : bool
-        Each reading of a batch gives the same as alone to the last bit, which a matrix product does not.
+        The result for each reading of a batch is bit-identical to that of the reading alone; a matrix product does not
+        ensure this.
     """
 
     def __init__(self, forms: Sequence[Form], exact: bool = False) -> None:
@@ -60,7 +61,7 @@ class Forms:
                 self._weights[used.index(k), j] = w
 
     def evaluate(self, values: FloatArray) -> FloatArray:
-        """Return the forms, (..., n_forms), of values, (..., n_slots)."""
+        """Return the results of the forms, (..., n_forms), for values of shape (..., n_slots)."""
         found = values.take(self._slots, axis=-1)
         if not self._single:
             found = (found[..., None] * self._weights).sum(axis=-2) if self._exact else found @ self._weights

@@ -1,4 +1,4 @@
-"""What the do-no-harm gate permits of a model."""
+"""Whether the do-no-harm gate permits a model to run, and to run without some of its inputs."""
 
 from collections.abc import Collection
 
@@ -20,7 +20,7 @@ class Gated:
         return self.honest_error is not None and self.honest_error.word == "accepted"
 
     def may_lose(self, names: Collection[str]) -> bool:
-        """Return whether the model is better than no compensation without these inputs: see `HonestError.may_lose`."""
+        """Return whether the model without these inputs is better than no compensation: see `HonestError.may_lose`."""
         return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
 
     def widening(self, names: Collection[str]) -> float:
@@ -28,7 +28,7 @@ class Gated:
         return 1.0 if self.honest_error is None else self.honest_error.widening(self._named(names))
 
     def _named(self, names: Collection[str]) -> list[str]:
-        """Return those names that are inputs, in their order."""
+        """Return the names that are inputs, in the order of the inputs."""
         return [i.name for i in self.inputs if i.name in names]
 
     def check_may_run(self) -> None:

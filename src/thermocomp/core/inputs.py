@@ -97,7 +97,7 @@ class TrainedRange(NamedTuple):
 
     @classmethod
     def of(cls, inputs: Sequence[Input], support: Support) -> "TrainedRange":
-        """Return the range of the given inputs."""
+        """Return the trained range of the given inputs, with the margin."""
         low = np.array([i.low for i in inputs])
         high = np.array([i.high for i in inputs])
         margin = support.margin * (high - low)

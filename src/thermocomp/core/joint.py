@@ -1,8 +1,8 @@
 """Joint support: distance of a reading, in all inputs together, from the training data of a model.
 
-A range per input treats every corner of the box as known: a hot front with a cold rear, or a speed between the trained
-ones. Here the distance to the nearest of a few training states counts, and for speeds the distance to the nearest
-trained speed. The calibration is described in `thermocomp.models.covering`.
+With a range per input, every combination of values within the ranges counts as covered: a hot front with a cold rear,
+or a speed between the trained ones. Here the distance to the nearest of a few training states counts, and for speeds
+the distance to the nearest trained speed. The calibration is described in `thermocomp.models.covering`.
 """
 
 import math

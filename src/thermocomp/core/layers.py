@@ -77,7 +77,7 @@ class _Lags(NamedTuple):
 
 
 class _Ticks(NamedTuple):
-    """A value with a clock of its own."""
+    """A value that is updated at fixed intervals (ticks)."""
 
     slots: slice
     memory: slice
@@ -102,14 +102,14 @@ class _Ticks(NamedTuple):
 
 @dataclass(frozen=True)
 class _Slot:
-    """A value before it has a place."""
+    """A value that has no position in the arrays yet."""
 
     level: int
     kind: str
     operands: tuple[Form, ...]
     numbers: tuple[float, ...] = ()
     curve: Curve | None = None
-    node: e.Lag | e.PacedLag | e.Recurrence | None = None  #: with a memory
+    node: e.Lag | e.PacedLag | e.Recurrence | None = None  #: the node, if it has a memory
 
 
 _WORK: dict[str, Callable[..., FloatArray]] = {
@@ -121,7 +121,7 @@ _WORK: dict[str, Callable[..., FloatArray]] = {
 
 
 class Layers:
-    """Expressions as layers.
+    """Expressions compiled to layers.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class Layers:
         return memory
 
     def begin_at(self, change: FloatArray, value: FloatArray) -> FloatArray:
-        """Return the memory of a machine at steady state for `change`, whose values with a clock are known, (...)."""
+        """Return the memory of a machine at steady state for `change`, with known values of its recurrences, (...)."""
         memory = self.begin(change)
         for layer in self._layers:
             if isinstance(layer, _Ticks):
@@ -210,7 +210,7 @@ class Layers:
         return memory, found
 
     def _run(self, memory: FloatArray, change: FloatArray, dt: float) -> FloatArray:
-        """Advance `memory` in place; return the values of all slots."""
+        """Advance `memory` in place by one time step; return the values of all slots."""
         values = np.empty((*change.shape[:-1], self._n))
         values[..., : self.n_inputs] = change
         for layer in self._layers:
@@ -219,7 +219,7 @@ class Layers:
 
 
 class _Builder:
-    """Values of expressions, each once, and their order."""
+    """Builder of layers: collects the values of expressions, each once, in the order of their computation."""
 
     def __init__(self, n_inputs: int) -> None:
         self._n_inputs = n_inputs
@@ -228,7 +228,7 @@ class _Builder:
         self._forms: dict[int, tuple[e.Node, Form]] = {}  #: by identity of the node, which is kept alive
 
     def form(self, node: e.Node) -> Form:
-        """Return a node as a linear form of slots."""
+        """Return the linear form of slots that computes a node of an expression."""
         known = self._forms.get(id(node))
         if known is None:
             known = self._forms[id(node)] = node, self._new_form(node)
@@ -282,7 +282,7 @@ class _Builder:
         curve: Curve | None = None,
         node: e.Lag | e.PacedLag | e.Recurrence | None = None,
     ) -> Form:
-        """Return the form of a value that is computed."""
+        """Return the linear form of the slot in which a node's value is computed."""
         if kind not in ("linear", "recurrence"):
             operands = tuple(self._single(f) for f in operands)
         level = 1 + max((self._levels[k] for f in operands for k, _ in f.weights), default=0)
@@ -293,16 +293,16 @@ class _Builder:
         return Form(((self._slots[slot], 1.0),), 0.0)
 
     def _single(self, form: Form) -> Form:
-        """Return a form of a single slot: the result of a form of several is a value of its own."""
+        """Return a form of a single slot; the result of a form of several slots becomes a new slot."""
         return form if len(form.weights) == 1 else self._value("linear", form)
 
     @property
     def exact(self) -> bool:
-        """Whether curves, which may have steps, are among the values."""
+        """True if the values include curves, which may have steps."""
         return any(s.curve is not None for s in self._slots)
 
     def lay(self) -> tuple[list[int], list[_Layer | _Lags | _Ticks], int]:
-        """Return the place of each slot, the layers in the order of computation, and the number of lags."""
+        """Return the position of each slot, the layers in the order of computation, and the number of lags."""
         groups: dict[tuple[object, ...], list[_Slot]] = {}
         for slot in sorted(self._slots, key=lambda s: s.level):
             key = (
@@ -350,13 +350,13 @@ class _Builder:
 
 
 def _places(found: list[int]) -> slice | IntArray:
-    """Return places in the memory, as a slice if they are adjacent."""
+    """Return positions in the memory, as a slice if they are adjacent."""
     adjacent = found == list(range(found[0], found[0] + len(found)))
     return slice(found[0], found[0] + len(found)) if adjacent else np.array(found, dtype=np.intp)
 
 
 def _work_of(slot: _Slot, numbers: FloatArray) -> Callable[..., FloatArray]:
-    """Return the operation of a layer."""
+    """Return the array function that computes a layer."""
     if slot.kind == "power":
         (exponents,) = numbers
         return np.square if (exponents == 2).all() else lambda of: of**exponents
@@ -387,7 +387,7 @@ def _ticker(node: e.Recurrence) -> Ticker:
 
 
 def _regressed(node: e.Node, k: int, leaves: Sequence[e.Node]) -> e.Node:
-    """Return an expression of a tick with its past values and means as inputs."""
+    """Return the expression of a tick with its past values and means as inputs."""
 
     def leaf(node: e.Node) -> e.Node | None:
         match node:

@@ -47,7 +47,7 @@ class ErrorModel(Gated, ModelFamily):
     target : str
         Displacement channel (or error component) that is predicted.
     unit : str
-        Unit of the deviation: um or urad; for a factor along an axis um/m, urad/m^2 and so on.
+        Unit of the deviation: um or urad; um/m, urad/m^2 and so on for the slopes of a position-dependent component.
     inputs : tuple of Input
         Inputs, in the order of their values.
     intercept : float
@@ -107,7 +107,7 @@ class ErrorModel(Gated, ModelFamily):
         self._check()
 
     def __getstate__(self) -> dict[str, object]:
-        """Return the numbers alone for a pickle; what is derived from them is derived again."""
+        """Return only the numbers for pickling; derived values are recomputed after loading."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     # -- evaluation ---------------------------------------------------------------------------------------------------
@@ -282,7 +282,7 @@ class ErrorModel(Gated, ModelFamily):
         return self.band.half_width(change, spread) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return the directions in which the structures averaged by the model differ.
+        """Return the directions in which the regressions averaged by the model differ.
 
         Parameters
         ----------
@@ -318,8 +318,8 @@ class ErrorModel(Gated, ModelFamily):
         time : str or array-like of shape (n_rows,), optional
             Time: numbers [s], or datetimes with or without a time zone; or the name of its column. Default: the column
             ``time_s``. A row that is not later than the previous one starts a new test, from rest and with a separate
-            zero: the mean over its start, see `Zeroing`; its spindle column, if present, shows whether the spindle is
-            stopped. A model without memory needs no time; then the first row is the zero.
+            zero (reference reading): the mean over its start, see `Zeroing`; its spindle column, if present, shows
+            whether the spindle is stopped. A model without memory needs no time; then the first row is the zero.
         reference : array-like of shape (n_inputs,), optional
             Reference of the inputs, as in `init`.
 
@@ -357,7 +357,7 @@ class ErrorModel(Gated, ModelFamily):
 
     @cached_property
     def _reference(self) -> FloatArray:
-        """Reference of each input; NaN where the first reading decides."""
+        """Reference of each input; NaN where the first reading is the reference."""
         return np.array([np.nan if i.rezero else i.reference for i in self.inputs])
 
     @cached_property
@@ -366,7 +366,7 @@ class ErrorModel(Gated, ModelFamily):
 
     @cached_property
     def leaves(self) -> tuple[Leaf, ...]:
-        """Inputs as leaves of an expression."""
+        """Inputs of the model as leaves of an expression."""
         return tuple(Leaf(k, i.name) for k, i in enumerate(self.inputs))
 
     @cached_property
@@ -388,7 +388,7 @@ class ErrorModel(Gated, ModelFamily):
 
     @property
     def remembered(self) -> tuple[Node, ...]:
-        """Lags and values with a clock, in the order of the memory."""
+        """Lags and recurrences, in the order of the memory."""
         return self._layers.remembered
 
     @property

@@ -47,7 +47,7 @@ def find_place(target: Path) -> Path:
 
 
 def cannot_be_written(target: Path, error: OSError) -> InputError:
-    """Return the user message for a disk error."""
+    """Return the error for a file that cannot be written, with the reason given by the system."""
     hint = f"; you need permission to create files in its folder {target.parent}" if error.errno in _NOT_ALLOWED else ""
     why = os.strerror(error.errno) if error.errno else error
     return InputError(f"{target}: cannot be written: {why}{hint}; an existing file is unchanged")

@@ -1,4 +1,4 @@
-"""States of paced models: lags of temperatures and of powers of the speed, with time constants that depend on speed."""
+"""States of a `PacedDynamic`: lags of temperatures and of powers of the speed, with speed-dependent time constants."""
 
 from typing import NamedTuple
 

@@ -75,7 +75,7 @@ class PacedDynamic(ErrorModel):
         n_top [1/min].
     spread : tuple of tuple of float
         Readout coefficients of the same terms (temperatures, their lags, lag by lag, and the speed states); the root of
-        the sum of the squared outputs is the spread of the structures averaged by the model [unit]; empty: unknown.
+        the sum of the squared outputs is the spread of the regressions averaged by the model [unit]; empty: unknown.
 
     Examples
     --------
@@ -149,7 +149,7 @@ class PacedDynamic(ErrorModel):
 
     @cached_property
     def bank(self) -> Bank:
-        """Bank of its states; models with the same bank can share them."""
+        """Lags and speed states of the model; models with the same bank can share their values."""
         taus, states = self.time_constants, self.states
         stopped = [1 / s.stopped for s in states]
         lags = [1 / tau for tau in taus for _ in self.temperatures]
@@ -194,7 +194,7 @@ class PacedDynamic(ErrorModel):
         return sum_weighted(weights, [terms[k] for k in order], self.intercept)
 
     def spread_expressions(self, change: Sequence[Node]) -> Sequence[Node]:
-        """Return the outputs of the rows of `spread`."""
+        """Return, as expressions, the outputs with each row of `spread` as readout coefficients."""
         terms = self._terms(change)
         return [sum_weighted(row, terms) for row in self.spread]
 
@@ -206,7 +206,7 @@ class PacedDynamic(ErrorModel):
         return tuple(self.inputs[k].name for k in sorted(active))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the readout coefficient of each term; ``lag(T1, 10 min)`` is a lag (speed: at rest, at top)."""
+        """Return the coefficient of each term; the name of a speed state contains its lags at rest and at top speed."""
         found: dict[str, float] = {}
         for t in self.temperatures:
             name = self.inputs[t.input].name

@@ -76,5 +76,5 @@ class Polynomial(ErrorModel):
         return tuple(self.inputs[i].name for i in sorted(used))
 
     def coefficients_by_name(self) -> dict[str, float]:
-        """Return the coefficient of each term."""
+        """Return the coefficient of each term, by its name."""
         return dict(zip(self._table.names(), self.coefficients, strict=True))

@@ -22,7 +22,8 @@ class PositionModel:
     """Frozen model of a position-dependent component: profile + offset + slopes (C-04, C-05).
 
     ``d(x, y, z, t) = f_g(x, y, z) + k_0(t) + k_1(t) q + k_2(t) q^2 + ...`` with q = (p - reference position) in metres,
-    p being the position of this axis: k_i in um/m^i or urad/m^i (E-C6). Chen has no k_0 and counts p from its zero.
+    p being the position of this axis: k_i in um/m^i or urad/m^i (E-C6). Chen has no k_0 and measures p from the zero of
+    the axis.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class PositionModel:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Power of q that is multiplied by each of `models`."""
+        """Power of q by which the output of each of `models` is multiplied."""
         return tuple(k for k, _ in self._by_power)
 
     def ranges(self) -> tuple[tuple[str, str, tuple[float, float]], ...]:

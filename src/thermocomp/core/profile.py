@@ -103,7 +103,7 @@ class PolynomialProfile:
         return np.asarray(self.value(coordinates(points)))
 
     def value(self, xyz: Coordinates) -> Numbers:
-        """Return the values at points prepared by `coordinates`."""
+        """Return the values of the profile at points prepared by `coordinates`."""
         along = self._along_one
         if along is not None:
             axis, coefficients = along
@@ -183,7 +183,7 @@ class SplineProfile:
         return np.asarray(self.value(coordinates(points)))
 
     def value(self, xyz: Coordinates) -> Numbers:
-        """Return the values at points prepared by `coordinates`."""
+        """Return the values of the profile at points prepared by `coordinates`."""
         p = clamp(xyz["XYZ".index(self.axis)], self.knots[0], self.knots[-1])
         if isinstance(p, float):
             i = min(bisect_right(self.knots, p), len(self.pieces)) - 1
@@ -208,7 +208,7 @@ def coordinates(points: FloatArray) -> Coordinates:
 
 
 def clamp(value: Numbers, low: float, high: float) -> Numbers:
-    """Return numbers clipped to the bounds."""
+    """Return coordinates clipped to a lower and an upper bound."""
     return min(max(value, low), high) if isinstance(value, float) else np.clip(value, low, high)
 
 

@@ -68,7 +68,7 @@ class HonestError:
     protocol : str
         Method by which the unseen cycles were selected.
     mae, rms, max_abs : float
-        Figures of the residual over all unseen cycles [unit of the model].
+        Error metrics over all unseen cycles [unit of the model].
     none_mae, none_rms : float
         The same without compensation.
     cycles : dict of str to float
@@ -78,7 +78,7 @@ class HonestError:
     reason : str
         Reason for the verdict, as text.
     units : int
-        Number of independent cycles or files used for judging.
+        Number of independent cycles or files used for the evaluation.
     tried : int
         Number of methods tried for the target.
     rules : int
@@ -86,10 +86,11 @@ class HonestError:
     taken : str
         Person who approved the use of an unproven model, and the reason; empty if none.
     harm_margin : float or None
-        Tolerated degradation in a single cycle, as specified before judging; None: by rule.
+        Tolerated degradation in a single cycle, as set before the evaluation; None: calculated by
+        `thermocomp.judging.do_no_harm.margin_of`.
     lost : dict of str to float
         RMS of the residual when a sensor, or several of them (``t1_C, t2_C``, in the order of the inputs), reads its
-        reference value from the start, with the watch active [unit of the model].
+        reference value from the start, with the watch (sensor monitoring) active [unit of the model].
 
     Raises
     ------
@@ -148,7 +149,7 @@ class HonestError:
 
     @property
     def why(self) -> str:
-        """The reason under the current rules."""
+        """Reason for the verdict under the current rules."""
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Approved by {self.taken}" if self.taken else why
@@ -162,7 +163,7 @@ class HonestError:
         return max(self.lost.get(key, math.inf) for key in (*names, ", ".join(names))) <= self.none_rms
 
     def widening(self, names: Sequence[str]) -> float:
-        """Return the factor by which the error increases without these inputs, named in their order; at least 1."""
+        """Return the factor by which the error increases without these inputs, in their model order; at least 1."""
         return max(1.0, self.lost.get(", ".join(names), 0.0) / self.rms) if self.rms else 1.0
 
     def check_may_run(self, target: str) -> None:

@@ -1,4 +1,4 @@
-"""Readings of the machine at one instant."""
+"""Readings of all sensors at one instant, and measurements of the tool point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Past values used by a value with a separate clock: see `thermocomp.core.expression.Recurrence`."""
+"""Past values used by a value that is updated at fixed intervals: see `thermocomp.core.expression.Recurrence`."""
 
 from thermocomp.core import expression as e
 

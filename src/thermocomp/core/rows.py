@@ -25,7 +25,7 @@ class Runnable(Protocol):
 
     @property
     def target(self) -> str:
-        """Displacement channel that is predicted."""
+        """Displacement channel that the model predicts."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -33,7 +33,7 @@ class Runnable(Protocol):
 
     @property
     def zeroing(self) -> Zeroing:
-        """Averaging time for the reference."""
+        """Averaging time of the reference of the inputs."""
 
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed."""

@@ -26,7 +26,7 @@ class Size:
 
     @classmethod
     def of(cls, errors: FloatArray) -> "Size":
-        """Return the size of errors of any shape [their unit]; NaN for an empty array."""
+        """Return the RMS and the largest absolute value of errors of any shape [their unit]; NaN for an empty array."""
         if not errors.size:
             return cls(math.nan, math.nan)
         return cls(float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()))

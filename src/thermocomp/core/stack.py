@@ -21,7 +21,7 @@ Tap = tuple[Input, float, float]
 class StackState(NamedTuple):
     """State of a stack between two steps; leading axes, if any, are a batch of independent runs."""
 
-    reference: FloatArray  #: (..., n_taps), values that count as zero
+    reference: FloatArray  #: (..., n_taps), values that count as zero; a tap is an input with its reference and range
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
     deviation: FloatArray  #: (..., n_models), last deviations returned
     outside: BoolArray  #: (..., n_taps), inputs beyond the trained range
@@ -128,7 +128,7 @@ class Stack:
     def _supported(
         self, before: FloatArray, deviation: FloatArray, change: FloatArray, clipped: FloatArray
     ) -> FloatArray:
-        """Return the deviations after ``hold`` and ``fade``."""
+        """Return the deviations after the support policies ``hold`` and ``fade`` outside the trained range."""
         far, outside = np.zeros(deviation.shape), clipped != change
         for k, joint, taps in self._joint:
             far[..., k] = joint.distance(change[..., taps])
@@ -177,7 +177,7 @@ class Stack:
 
 
 def _padded(taps: dict[int, IndexArray]) -> tuple[IndexArray, IndexArray]:
-    """Return models (n,) and their taps (n, maximum number of taps), padded by repeating the first tap of a model."""
+    """Return models (n,) and their taps (n, maximum number of taps), padded with repetitions of a model's first tap."""
     widest = max((len(t) for t in taps.values()), default=0)
     rows = [[*t, *t[:1].tolist() * (widest - len(t))] for t in taps.values()]
     return np.array(list(taps), dtype=np.intp), np.array(rows, dtype=np.intp).reshape(len(taps), widest)

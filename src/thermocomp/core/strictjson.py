@@ -5,7 +5,7 @@ from typing import Any
 
 
 def parse_json(text: bytes | str) -> Any:
-    """Return the content of a JSON text."""
+    """Return the content of a JSON text; repeated keys and invalid UTF-8 are errors."""
     try:
         # json would guess UTF-16 and UTF-32, and use the last of duplicate keys
         return json.loads(text.decode("utf-8") if isinstance(text, bytes) else text, object_pairs_hook=_once)

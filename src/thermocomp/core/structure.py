@@ -50,7 +50,7 @@ class Structure:
 
     @classmethod
     def parse(cls, code: str) -> "Structure":
-        """Return the structure given by a code."""
+        """Return the kinematic structure given by a code such as ``w X' b Z Y (C1) t``."""
         text = "".join(code.split()).replace("’", "'").replace("′", "'").upper()
         short = _SHORT.fullmatch(text)
         if short and text:
@@ -82,7 +82,7 @@ class Structure:
 
 
 def _made(workpiece: Sequence[str], tool: Sequence[str]) -> Structure:
-    """Return the structure from all axes of both sides."""
+    """Return the structure from the axes on the workpiece side and on the tool side."""
     turning: list[tuple[str, Side]] = [(a, "table") for a in workpiece if a in _ROTARY]
     turning += [(a, "head") for a in tool if a in _ROTARY]
     rotary = dict(turning)

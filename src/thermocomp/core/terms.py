@@ -50,7 +50,7 @@ class Variable:
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":
-        """Return the variable equal to a single input."""
+        """Return the variable that equals one of the inputs."""
         return cls(name, ((index, 1.0),))
 
     @classmethod
@@ -84,7 +84,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class TermTable:
-    """Evaluator of terms for one or many readings."""
+    """Computes the values of terms for one or many readings."""
 
     n_inputs: int
     variables: tuple[Variable, ...]
@@ -115,7 +115,7 @@ class TermTable:
 
     @cached_property
     def _factors(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Per degree: the terms that reach it, and the variable that is their next factor."""
+        """Per degree: the terms of at least this degree, and the variable that is their factor at this place."""
         by_degree = []
         for k in range(max((len(t) for t in self.terms), default=0)):
             rows = [i for i, t in enumerate(self.terms) if len(t) > k]
@@ -123,7 +123,7 @@ class TermTable:
         return by_degree
 
     def evaluate(self, change: FloatArray) -> FloatArray:
-        """Return the terms' values.
+        """Return the values of the terms.
 
         Parameters
         ----------

@@ -1,10 +1,10 @@
-"""A value that is updated at every tick of a clock of its own (P-01).
+"""A value that is updated at fixed intervals, whatever the times of the readings (P-01).
 
-The clock ticks every `interval`; readings may come at any time:
+There is a tick every `interval`; readings may come at any time:
 
-- A reading represents the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input of
-  a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is the
-  reading itself.
+- A reading is assigned to the time since the previous reading, as for the lags of `thermocomp.core.lagbank`. The input
+  of a tick is the mean of the inputs over the interval that ends at the tick. With one reading per interval, this is
+  the reading itself.
 - Ticks are computed when they are due, several at once after a gap. The work is bounded: once the stored inputs are all
   equal, the rest of a gap is one matrix power (for a net, the loop ends once its output has settled).
 - Between two ticks the value is interpolated linearly from the last tick towards the next one, which is computed
@@ -22,12 +22,12 @@ from thermocomp.core.exceptions import InputError
 
 #: fraction of the interval by which a reading may come early and still trigger the tick; covers rounding of clocks
 EARLY = 1e-6
-#: maximum number of ticks made at once of a value that is no linear form: one day at 15 s; after that it has settled
+#: maximum number of ticks computed at once if the next value is not a linear form: one day at 15 s; it has settled then
 MOST_TICKS = 5760
 
 
 class Ticker:
-    """Such a value, of one reading or many; the runs of a batch share one clock.
+    """A value updated at every tick, for one reading or many; the runs of a batch have their ticks at the same times.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ class Ticker:
         return np.concatenate([clock, total, own, past], axis=-1), value
 
     def _one(self, own: FloatArray, mean: FloatArray, past: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Make one tick; return the last values and the means over the last m intervals, newest first."""
+        """Compute one tick; return the last values and the means over the last m intervals, newest first."""
         value = self._tick(np.concatenate([own[..., : self._k], mean, past], axis=-1))
         own = np.concatenate([value[..., None], own[..., :-1]], axis=-1)
         return own, np.concatenate([mean, past], axis=-1)[..., : self._m * self._n]
 
     def _coast(self, own: FloatArray, inputs: FloatArray, past: FloatArray, ticks: int) -> FloatArray:
-        """Return the last values after more ticks at constant inputs, which all of `past` are."""
+        """Return the last values after further ticks at constant inputs; all inputs in `past` are equal."""
         if self._linear is None:
             for _ in range(min(ticks, MOST_TICKS)):
                 before = own
@@ -117,7 +117,7 @@ class Ticker:
 
     @staticmethod
     def _phase(memory: FloatArray) -> float:
-        """Return the time since the last tick."""
+        """Return the time since the last tick [s]."""
         clocks = memory[..., 0]
         first = float(clocks.flat[0]) if clocks.size else 0.0
         if (clocks != first).any():

@@ -1,4 +1,4 @@
-"""Conditions covered by the units on which a model was judged."""
+"""Conditions covered by the cycles, files or blocks on which a model was judged."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,17 @@ from thermocomp.core.exceptions import SettingError
 
 @dataclass(frozen=True)
 class Validity:
-    """Conditions covered by the judged units, for which the honest error is valid.
+    """Conditions covered by the judged cycles, files or blocks, for which the honest error is valid.
 
     Parameters
     ----------
     units : int
         Number of judged cycles, files or blocks.
     independent : int
-        Number of units, with similar ones counted once.
+        Number of these, with similar ones counted once.
     nearest : float or None
-        Distance between the two most similar units, in standard deviations of the inputs; None with a single unit.
-        Below `thermocomp.judging.coverage.ALIKE` two units count as alike.
+        Distance between the two most similar of these, in standard deviations of the inputs; None with a single one.
+        Below `thermocomp.judging.coverage.ALIKE` the two count as alike.
     speeds : tuple of float
         Spindle speeds that were run; speeds within 2 % of the largest are merged [1/min]; empty if not recorded.
     ambient : tuple of float or None
@@ -26,7 +26,8 @@ class Validity:
     ambient_channel : str
         Channel of the ambient temperature; empty if there is none.
     start : tuple of float or None
-        Minimum and maximum of the mean of all temperatures at the start of a unit [degC]; None without temperatures.
+        Minimum and maximum of the mean of all temperatures at the start of a judged cycle, file or block [degC]; None
+        without temperatures.
     days : int
         Number of calendar days with judged rows; 0 if the recordings have no time stamps.
     hours : float
@@ -35,7 +36,7 @@ class Validity:
     Raises
     ------
     InputError
-        Fewer units than independent ones, or invalid counts or values.
+        `units` is less than `independent`, or a count or value is invalid.
     """
 
     units: int

@@ -1,4 +1,4 @@
-"""`Watch`: prediction of each temperature from the others and the spindle speed, with limits of the difference."""
+"""`Watch`: sensor monitoring by predicting each temperature from the others and the spindle speed."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,7 +30,7 @@ IntArray = NDArray[np.intp]
 LASTING = 300.0
 #: largest speed, relative to the highest trained one, at which differences are evaluated
 FASTER = 1.02
-#: lower bound of the error used to weight differences [degC]
+#: lower bound of the prediction error by which differences are weighted [degC]
 LEAST_UNSEEN = 0.05
 
 
@@ -46,7 +46,7 @@ class Watched:
         Readout coefficients of the temperatures, of their lags, lag by lag, and of the speed states [degC/degC; degC];
         0 for the temperature itself.
     off : float
-        Difference from the prediction above which the sensor is off [degC].
+        Difference from the prediction above which the sensor counts as faulty [degC].
     jump : float
         Change within `Watch.pace` above which the reading has jumped [degC].
     moved : float
@@ -54,7 +54,7 @@ class Watched:
     still : float
         Longest constant reading while another one changes, above which the sensor is stuck; `GAP`: no time limit [s].
     unseen : float
-        RMS error of the prediction in cycles that were left out [degC].
+        Cross-validation error (RMS) of the prediction, on left-out cycles [degC].
     """
 
     input: int
@@ -132,12 +132,12 @@ class Watch:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the temperatures."""
+        """Names of the monitored temperatures."""
         return tuple(self.inputs[s.input].name for s in self.sensors)
 
     @cached_property
     def bank(self) -> Bank:
-        """Bank of the speed states and lags."""
+        """Lags and speed states from which temperatures are predicted."""
         stopped = [1 / slow for _, _, slow, _ in self.states]
         lags = [1 / tau for tau in self.time_constants for _ in self.sensors]
         return Bank(
@@ -166,12 +166,12 @@ class Watch:
 
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:
-        """Indices of all pairs of sensors."""
+        """Indices of the sensors of all possible pairs."""
         first, second = np.triu_indices(len(self.sensors), 1)
         return first, second
 
     def limits(self, what: str) -> FloatArray:
-        """Return a limit of each sensor, (n_sensors,): off, jump, moved or still; or its error on unseen cycles."""
+        """Return one field of `Watched` for each sensor, (n_sensors,): off, jump, moved, still or unseen."""
         return self._limits[what]
 
     @cached_property

@@ -19,7 +19,7 @@ BoolArray = NDArray[np.bool_]
 
 #: maximum number of averaged readings at any rate; it reduces the noise sufficiently, and bounds the memory
 MOST = 600
-#: below this speed the spindle counts as stopped: reading of a tachometer at rest [1/min]
+#: below this speed the spindle counts as stopped: a tachometer may show a few revolutions at rest [1/min]
 STANDS = 10.0
 #: distance from the median, in median absolute deviations, beyond which a value is an outlier (four sigma if normal)
 FAR = 6.0
@@ -27,7 +27,7 @@ FAR = 6.0
 
 @dataclass(frozen=True)
 class Zeroing:
-    """Averaging time of the zero of temperatures.
+    """Averaging time of the zero (reference reading) of temperatures.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Gathered(NamedTuple):
         return bool(self.times) and (len(self.times) >= MOST or self.times[-1] - self.times[0] >= self._span(zeroing))
 
     def add(self, time: float, values: FloatArray, resting: bool) -> "Gathered":
-        """Return the collected readings with one more."""
+        """Return the collected readings with a further reading appended."""
         return Gathered((*self.times, time), (*self.values, values), self.resting if self.times else resting)
 
     def _span(self, zeroing: Zeroing) -> float:

@@ -11,7 +11,7 @@ from thermocomp.runtime.program.tables import Tables
 
 
 class Drive(NamedTuple):
-    """An axis to which a correction is applied."""
+    """An axis of the controller, and the correction that is applied to it."""
 
     letter: str
     target: int  #: index of its correction
@@ -20,7 +20,7 @@ class Drive(NamedTuple):
 
 
 def find_drives(tables: Tables, named: Mapping[str, str]) -> list[Drive]:
-    """Return the axes to which corrections are applied."""
+    """Return the axes to which corrections are applied, by option or by the names of the targets."""
     if unknown := [t for t in named if t not in tables.targets]:
         raise InputError(f"--axes {unknown[0]}: no such target; there are {', '.join(tables.targets)}")
     found: dict[str, Drive] = {}
@@ -48,7 +48,7 @@ WHOLE = 2**31 - 1
 
 
 class Value(NamedTuple):
-    """Input value of a controller for one axis."""
+    """A parameter or variable of a controller that receives part of a correction, per axis."""
 
     name: str
     about: str

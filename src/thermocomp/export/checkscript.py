@@ -96,5 +96,5 @@ _FILES = {KLIPPER: "cfg", HEIDENHAIN: "txt", FANUC: "nc"}
 
 
 def write_script(answers: str, name: str) -> str:
-    """Return the source of the script."""
+    """Return the source of the Python script that runs the test vectors."""
     return _SCRIPT.format(name=name, file=f"{name}.{_FILES[answers]}", answers=answers)

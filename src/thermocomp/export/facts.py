@@ -8,7 +8,7 @@ from thermocomp.runtime.compensator import Compensator
 
 @dataclass(frozen=True)
 class Facts:
-    """Origin of an export.
+    """Origin of an export: model file, version and date.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Facts:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     def origin(self) -> list[str]:
-        """Return lines of text on the origin of the export."""
+        """Return lines of text about the origin of the export: model file, version, date."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
             f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",
@@ -39,7 +39,7 @@ class Facts:
         ]
 
     def lines(self, compensator: Compensator) -> list[str]:
-        """Return the summary, with the verdict in the first line."""
+        """Return the summary of an export as lines of text, with the verdict first."""
         found, limits = [_verdict(compensator)], compensator.limits
         found += [f"{target}: {status.reason}" for target, status in compensator.shadow.items()]
         taken = {m.honest_error.taken for m in compensator.models if m.honest_error and m.honest_error.taken}

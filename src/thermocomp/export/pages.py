@@ -5,7 +5,7 @@ from thermocomp.runtime.program.tables import Tables
 
 
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:
-    """Return the parts of the page by name."""
+    """Return the parts of the instruction page as text, by name."""
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing
     sensors = (

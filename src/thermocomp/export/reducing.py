@@ -24,7 +24,7 @@ _Model = TypeVar("_Model", bound=ErrorModel | PositionModel)
 
 @dataclass(frozen=True, kw_only=True)
 class ExportOrder:
-    """Export to be written.
+    """Settings of an export to be written.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ExportOrder:
 
 
 class Outcome(NamedTuple):
-    """Result of an export."""
+    """Result of an export: its files, and the targets that are not exported."""
 
     files: dict[str, bytes]  #: by file name
     refused: dict[str, str]  #: targets that must not be exported, with the reason
@@ -58,7 +58,7 @@ def export_reduced(
     accept_unproven: str | None,
     listener: "Listener",
 ) -> Outcome:
-    """Create the files of an export to a target with a shape."""
+    """Create the files of an export to a controller that supports reduced models only."""
     to, shape, options = order.to, order.target.shape, order.options
     assert shape is not None
     wanted, axes, elsewhere = along_axes(models, options, to, shape.axes)

@@ -1,4 +1,4 @@
-"""Export target: a writer, and the options of its controller."""
+"""`Target`: an export target, with the function that writes its files and its options."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -25,12 +25,12 @@ from thermocomp.runtime.watch import RETURN, WORDS
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-#: values of `thermocomp.runtime.state.Status`, in the order of the block's codes
+#: values of `thermocomp.runtime.state.Status`, in the order of the block's status numbers
 STATUS = ("restarting", "active", "holding", "fading", "shadow")
 
 
 class Readings(NamedTuple):
-    """Readings passed to a block."""
+    """Readings of the test vectors, with their age and time steps."""
 
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
     age: FloatArray  #: (n_calls,), age of the values [s]
@@ -38,7 +38,7 @@ class Readings(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """Outputs of a block."""
+    """Outputs of a compensator for the readings of the test vectors."""
 
     correction: FloatArray  #: (n_calls, n_targets), at the reference position [um]
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
@@ -96,7 +96,7 @@ _UNWRITTEN = (Band, HonestError, Provenance, Validity, Zeroing)
 
 
 def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
-    """Return a value with all numbers that the exported code holds rounded, except integers; arrays at once."""
+    """Return a value with all numbers of the exported code rounded, except integers; arrays as a whole."""
     if isinstance(value, float):
         return float(rounded(np.array(value)))
     if isinstance(value, np.ndarray) and value.dtype == np.float64:
@@ -112,7 +112,7 @@ def round_all(value: Any, rounded: Callable[[FloatArray], FloatArray]) -> Any:
 
 
 def find_tolerance(models: Sequence[ErrorModel]) -> float:
-    """Return the tolerance for other code in double precision: feedback amplifies rounding errors.
+    """Return the tolerance for exported code in double precision: feedback amplifies rounding errors.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Export of models as code for other controllers, in Python."""
+"""Python functions that export models as program code for controllers."""
 
 import math
 import re

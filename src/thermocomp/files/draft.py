@@ -4,8 +4,8 @@ A failure or a killed run leaves the old file or the new one: never a partial fi
 
 - A symbolic link is kept: its target is written, in the target's folder. The target of a dangling link is created if
   its folder exists; circular links, folders, pipes, devices and read-only files are rejected.
-- The permissions of a replaced file are kept (and its owner, if the system allows it); a new file gets those left by
-  the umask. Other hard links to the file keep the old content.
+- The permissions of a replaced file are kept (and its owner, if the system allows it); a new file gets the default ones
+  (umask). Other hard links to the file keep the old content.
 - Drafts left by a killed run are removed by the next run that writes to the folder: see `thermocomp.files.scratch`.
 """
 
@@ -89,7 +89,7 @@ class _Move(NamedTuple):
             os.fsync(file.fileno())
 
     def keep(self) -> None:
-        """Give the old file a second name."""
+        """Give the old file a second name (hard link), so that it can be restored."""
         if _status(self.place) is None:
             return
         try:
@@ -169,7 +169,7 @@ def _status(path: Path) -> os.stat_result | None:
 
 @contextmanager
 def _telling(places: dict[Path, Path]) -> Iterator[None]:
-    """Convert disk errors about drafts to an error that names the file; other errors pass unchanged."""
+    """Convert disk errors concerning drafts to an error that names the file; other errors pass unchanged."""
     try:
         yield
     except OSError as e:

@@ -16,7 +16,8 @@ from thermocomp.core.shown import replace_unprintable
 from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import find_keys, list_errors, read_text, strict_adapter
 
-#: maximum size of a file [bytes]; models of additive curves over 9,000 rows had 8 million each before thinning
+#: maximum size of a file [bytes]; additive models fitted to 9,000 rows had 8 million each before their curves were
+#: thinned
 MOST = 64_000_000
 #: maximum counts of characters in the content, so that the memory for any file is bounded
 _COUNTS = {",": 4_000_000, "[": 500_000, "{": 20_000, '"': 300_000}
@@ -131,12 +132,12 @@ def _stop_at_first(schema: Any) -> None:
 
 
 def write(text: str, path: str | Path, *, overwrite: bool) -> None:
-    """Write the text of a file."""
+    """Write the text of a model file; raise `InputError` if the file exists and `overwrite` is False."""
     write_text(text, Path(path), overwrite=overwrite)
 
 
 def read(kind: Format, path: str | Path) -> tuple[str, str]:
-    """Return the text of a file, and its name for messages."""
+    """Return the text of a model file, and its name for messages."""
     return read_text(path, kind.words, MOST, ModelFileError), str(path)
 
 
@@ -170,7 +171,7 @@ def _parse(text: str, no: str, source: str, command: str) -> Any:
 
 
 def _found(text: str) -> str:
-    """Return a description of a text that is not JSON."""
+    """Return a description of a text that is not JSON, for an error message."""
     line = next((line.strip() for line in text.splitlines() if line.strip()), "")
     if not line:
         return "it is empty"

@@ -27,7 +27,7 @@ QUANTITY = {"um": "displacement", "urad": "angle"}
 
 
 class ManyError(SettingError):
-    """Collected errors, and the valid values."""
+    """Several errors of a list or table, with the values that were valid."""
 
     def __init__(self, errors: Sequence[SettingError], found: dict[str, Any]) -> None:
         super().__init__(str(errors[0]))
@@ -36,7 +36,7 @@ class ManyError(SettingError):
 
 @contextmanager
 def kept(errors: list[SettingError]) -> Iterator[None]:
-    """Store an error and continue after the block."""
+    """Collect an error raised in the ``with`` block, and continue after the block."""
     try:
         yield
     except SettingError as e:
@@ -60,7 +60,7 @@ def each(values: Mapping[str, Any], convert: Callable[[str, Any], Any]) -> dict[
 
 
 def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[str, Any]:
-    """Return a table in house units."""
+    """Return a table of a machine file with its values converted to house units."""
     if not isinstance(value, dict):
         raise SettingError(f"{value!r}: must be a table", where)
 
@@ -73,7 +73,7 @@ def read_table(value: Any, known: Mapping[str, Convert], where: Keys) -> dict[st
 
 
 def measure(quantity: str) -> Convert:
-    """Return a reader of text with a number and a unit."""
+    """Return a function that converts a text with a number and a unit to house units."""
     what, example = _SAID[quantity]
 
     def convert(value: Any, where: Keys) -> float:
@@ -94,7 +94,7 @@ def measure(quantity: str) -> Convert:
 
 
 def _several(convert: Convert, n: int, example: str) -> Convert:
-    """Return a reader of lists of n values."""
+    """Return a function that converts a list of n values."""
 
     def converted(value: Any, where: Keys) -> tuple[Any, ...]:
         if not isinstance(value, list) or len(value) != n:
@@ -149,7 +149,7 @@ AXIS: dict[str, Convert] = {
     "rapid": measure("feed"),
     "acceleration": measure("acceleration"),
 }
-#: keys that define the point from which the lever of a component in urad counts
+#: keys that define the point from which the lever of a component in urad is measured
 COUNTED_FROM = {
     "axis": ("measured_at", "measured_tool"),
     "squareness": ("reference_position",),

@@ -164,7 +164,7 @@ def _check_measured_at(axis: Axis, axes: Sequence[Axis]) -> None:
 def _check_counted(
     component: ErrorComponent, axes: Mapping[str, Mapping[str, Any]], spindle: Mapping[str, Any]
 ) -> None:
-    """Raise an error if a component in urad is given, but not the point from which its lever counts."""
+    """Raise an error if a component in urad is given, but not the point from which its lever is measured."""
     if component.unit != "urad":
         return
     where: Keys = ("axes", component.axes[0]) if component.axes else ("spindle",)

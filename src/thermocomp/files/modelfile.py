@@ -33,8 +33,8 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     Raises
     ------
     ModelFileError
-        A model belongs to a family that cannot be stored, such as a Gaussian process, which has no coefficients; or
-        two models have different watches.
+        A model belongs to a family that cannot be stored, such as a Gaussian process, which has no coefficients; or two
+        models have different watches (sensor monitoring).
     """
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
@@ -109,7 +109,7 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
 
 
 def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
-    """Reject a verdict that contradicts its own figures; the verdict of a position model covers several factors."""
+    """Reject a verdict inconsistent with the stored errors; that of a position model covers several factors."""
     for k, model in enumerate(models, start=1):
         found = model.honest_error
         if found is None:

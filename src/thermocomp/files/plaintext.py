@@ -18,7 +18,7 @@ _MOST = 600
 
 
 def read_text(path: str | Path, what: str, most: int, failure: type[InputError] = InputError) -> str:
-    """Read a text file."""
+    """Return the text of a small UTF-8 file; raise an error that names the file and the fault."""
     source = Path(path)
     try:
         if not stat.S_ISREG(source.stat().st_mode):
@@ -40,7 +40,7 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
 
 
 def strict_adapter(kind: type[_T]) -> TypeAdapter[_T]:
-    """Return the validator of a file's content: an unknown key, a number in quotes and NaN are errors, not guesses."""
+    """Return the validator of a file's content: an unknown key, a number in quotes and NaN are rejected."""
     return TypeAdapter(with_config(ConfigDict(strict=True, extra="forbid", allow_inf_nan=False))(kind))
 
 

@@ -1,7 +1,7 @@
 """Temporary working folders; those left by a killed run are removed by the next run.
 
 Each folder has a file that the run locks for its lifetime, and the system releases the lock however the run ends: if
-the lock can be acquired, the run is dead and the folder is removed.
+the lock can be acquired, the run has ended and the folder is removed.
 """
 
 import os
@@ -27,7 +27,7 @@ def scratch(folder: Path | None = None) -> Iterator[Path]:
     Parameters
     ----------
     folder : Path, optional
-        Destination of the files that will be moved out: on the same disk, a move is a single step. Default: the
+        Destination of the files that will be moved out: on the same disk, a move is atomic. Default: the
         system's folder for temporary files.
     """
     folder = folder or Path(gettempdir())
@@ -45,7 +45,7 @@ def is_scratch(name: str) -> bool:
 
 
 def _made(folder: Path) -> tuple[Path, int]:
-    """Return a new folder and its open lock file."""
+    """Return a new temporary folder and its open lock file."""
     while True:
         path = folder / f"{_PREFIX}{uuid4().hex}"
         path.mkdir(0o700)
@@ -74,7 +74,7 @@ def _locked(lock: int, *, wait: bool = True) -> bool:
 
 
 def _clear(folder: Path) -> None:
-    """Remove the folders of dead runs."""
+    """Remove the temporary folders of runs that have ended without removing them."""
     found: list[Path] = []
     with suppress(OSError):
         found = [p for p in folder.iterdir() if is_scratch(p.name)]

@@ -18,7 +18,7 @@ DEPTH = 32
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
-    """Read a TOML file."""
+    """Return the content of a TOML file; raise an error with the position of a fault."""
     source = Path(path)
     text = read_text(source, what, MOST)
     for n, line in enumerate(text.splitlines(), start=1):

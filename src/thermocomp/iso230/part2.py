@@ -33,7 +33,7 @@ UNCERTAINTY = "The measurement uncertainty is not given: ISO 230-2:2014 requires
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """One direction of approach.
+    """Results for one direction of approach.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Direction:
 
     @property
     def repeatability(self) -> FloatArray:
-        """R of each target: 4 s, (n_targets,)."""
+        """Unidirectional repeatability R at each target: 4 s, (n_targets,)."""
         return 4.0 * self.s
 
     @property

@@ -321,7 +321,7 @@ def _lead(recording: Recording, earliest: int, start: int) -> int:
 
 
 def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], number: int, lead: int) -> list[str]:
-    """Return notes on the course of a test."""
+    """Return notes on the course of a test: too short, without cool-down, or without rest before it."""
     start, stop, end = rows
     notes = []
     running = recording.time[stop] - recording.time[start]

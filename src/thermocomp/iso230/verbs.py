@@ -1,4 +1,4 @@
-"""Thermal tests after ISO 230-3, positioning after ISO 230-2 and time constants, in Python."""
+"""Python functions for thermal tests (ISO 230-3), positioning tests (ISO 230-2) and time constants."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

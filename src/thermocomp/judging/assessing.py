@@ -53,7 +53,7 @@ class Judged:
     starts: tuple[tuple[str, Start], ...] = ()
 
     def overall(self) -> tuple[Assessment, ...]:
-        """Return one assessment per model, over all cycles."""
+        """Return the assessments of the models over all cycles, one per model."""
         return tuple(a for a in self.assessments if a.overall)
 
 
@@ -136,7 +136,7 @@ def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]
 
 
 def _refused(model: ErrorModel, why: str) -> Assessment:
-    """Return the assessment of a model without data for judging."""
+    """Return the assessment of a model that cannot be judged because there are no unseen rows: refused."""
     nothing, nowhere = np.empty(0), np.empty(0, np.intp)
     return Assessment(
         model=_name(model),
@@ -158,7 +158,7 @@ def _name(model: ErrorModel) -> str:
 
 
 def _called_as_in(model: ErrorModel, samples: Samples) -> Samples:
-    """Return samples whose channels have the names used in the model: names in a file may differ."""
+    """Return samples with the channel names used in the model: the names in a file may differ."""
     (target,) = samples.targets
     inputs = zip(samples.inputs, model.inputs, strict=True)
     return replace(
@@ -206,7 +206,7 @@ def _assess(
 
 
 def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:
-    """Return the readings that a model's watch passes while sensors fail; shared by models of one file (`known`)."""
+    """Return the readings that a model's watch passes on while sensors fail; shared by models of one file."""
     watch = model.watch
     if watch is None or watched is None or not can_look(watch, watched):
         return None
@@ -230,7 +230,7 @@ def _goes_on(model: ErrorModel, samples: Samples, known: BoolArray) -> bool:
 
 
 def units(samples: Samples, rows: BoolArray | None = None) -> Judging:
-    """Return the thermal cycles of recordings, or of some of their rows, as units; see `join_short_cycles`."""
+    """Return the thermal cycles of recordings, or of some of their rows, for judging; see `join_short_cycles`."""
     none = np.zeros(len(samples), dtype=np.bool_)
     cycle = samples.cycle if rows is None else np.where(rows, samples.cycle, -1)
     blocks = join_short_cycles(cycle, samples.test)

@@ -35,7 +35,7 @@ class Budget:
     unit : str
         Common unit of the targets, see `thermocomp.judging.sensorsets.weigh_targets`.
     scales : ndarray of shape (n_targets,)
-        Size of one common unit in the unit of each target.
+        One common unit, expressed in the unit of each target.
     candidates : tuple of str
         All temperatures.
     sensors : tuple of tuple of str
@@ -125,7 +125,7 @@ class Budget:
         """Return the model that needs the fewest sensors, and the index of their set in `sensors`.
 
         A set is not better than no compensation, and so not sufficient, if its mean gain over the blocks is less than
-        the minimum gain of a sensor, or at most one standard error of this gain between the blocks.
+        the minimum gain of a sensor, or at most one standard error of this gain over the blocks.
 
         Returns
         -------
@@ -138,7 +138,7 @@ class Budget:
     def margin(self) -> tuple[float, float, float] | None:
         """Return the tolerated excess of the mean RMS over the smallest one, and the two values behind it [`unit`].
 
-        The larger of one standard error of the smallest mean between the blocks (Breiman 1984, Classification and
+        The larger of one standard error of the smallest mean over the blocks (Breiman 1984, Classification and
         Regression Trees, section 3.4.3) and `WORTH`, the latter at most `SHARE` of the error without compensation.
 
         Returns
@@ -293,7 +293,7 @@ def _conditions(samples: Samples, sets: Sequence[Sequence[str]]) -> FloatArray:
 
 
 def _judge_subset(samples: Samples, piece: tuple[Split, Sequence[str], str]) -> FloatArray | str:
-    """Return the RMS of a model of some temperatures on the unseen rows of a split, see `unseen_rms`."""
+    """Return the RMS of a model with a subset of the temperatures on the unseen rows of a split, see `unseen_rms`."""
     split, sensors, name = piece
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
     return unseen_rms(samples.only([*sensors, *speeds]), name, split.learn, split.judge)

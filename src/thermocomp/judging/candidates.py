@@ -1,4 +1,4 @@
-"""Candidate sensors for a selection."""
+"""Candidate temperature sensors for a selection method."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Candidates:
 
     @classmethod
     def of(cls, samples: Samples, target: int) -> "Candidates":
-        """Return the temperatures and one target in the complete rows."""
+        """Return the candidate temperatures and one target, in the rows without missing values."""
         temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
         name = samples.targets[target].name
         if not temperatures:
@@ -51,15 +51,15 @@ class Candidates:
 
     @property
     def names(self) -> list[str]:
-        """Names of the temperatures."""
+        """Names of the candidate temperatures."""
         return [str(n) for n in self.X.columns]
 
     def called(self, columns: Sequence[int]) -> tuple[str, ...]:
-        """Return the names of some of the temperatures."""
+        """Return the names of the temperatures in the given columns."""
         return tuple(self.names[j] for j in columns)
 
     def repeats(self, sensors: Sequence[str]) -> Table:
-        """Return the collinearity of some of the sensors."""
+        """Return a table of the collinearity of the given sensors."""
         values = self.X[list(sensors)].to_numpy()
         found = diagnose(values, self.y, tuple(sensors))
         raw = found.spectrum

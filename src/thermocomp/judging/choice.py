@@ -76,7 +76,7 @@ class Settings:
                 raise InputError(f"{option} is for --method {' or '.join(LOOKED_AT_BY[f.name])}, not for {method}")
 
     def most(self, method: str) -> int:
-        """Return the maximum number of sensors of a method."""
+        """Return the maximum number of sensors that a method may select."""
         if self.max_sensors is not None and self.max_sensors < 1:
             raise InputError(f"--max-sensors {self.max_sensors}: expected at least 1")
         return self.max_sensors if self.max_sensors is not None else {"ace": 3, "pareto": 6}.get(method, 10)

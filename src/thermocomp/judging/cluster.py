@@ -30,7 +30,8 @@ WORKERLESS = 30.0
 #: packages whose versions must agree for identical results
 ALIKE = ("python", "thermocomp", "numpy", "scipy", "scikit-learn", "numba", "pandas")
 
-#: a worker does one task at a time, whatever its threads: this bounds its memory, and warnings are per process
+#: a worker executes one task at a time, whatever its number of threads: this bounds its memory, and warnings are per
+#: process
 _turn = threading.Lock()
 
 
@@ -189,7 +190,7 @@ class Cluster:
                     lonely = True
 
     def _ask(self) -> int:
-        """Return the number of workers."""
+        """Return the number of workers connected to the scheduler."""
         try:
             return len(self._client.nthreads(callback_timeout=ASKED))
         except Exception as e:
@@ -209,7 +210,7 @@ class Cluster:
 
 
 def _do(shared: tuple[Any, Sequence[Any], Any], number: int, versions: Mapping[str, str | None]) -> bytes:
-    """Do one task in a worker."""
+    """Execute one task in a worker."""
     # check a worker that joined later
     _check_versions(versions, _alike(get_versions(ALIKE)["packages"]), get_worker().address)
     work, pieces, failed = shared

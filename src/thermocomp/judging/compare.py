@@ -103,7 +103,7 @@ def compare(
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
 ) -> dict[str, Guard | None]:
-    """Return the readings that a watch passes in each block, with the watch trained on the block's training rows."""
+    """Return the readings that a watch passes on in each block, with the watch trained on the block's training rows."""
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
     found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
@@ -146,14 +146,14 @@ def _concluded(
 
 
 def _heat(samples: Samples) -> Collinearity:
-    """Return the collinearity of the temperatures."""
+    """Return the collinearity of the temperatures in all complete rows."""
     temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
     values = samples.change()[samples.valid][:, temperatures]
     return collinearity(values, tuple(samples.inputs[j].name for j in temperatures))
 
 
 def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]:
-    """Return the inner splits needed for a recommendation; empty if there is no choice."""
+    """Return the inner splits for recommending a method; empty with one method only, or with a primary one."""
     choices = sum(deployable(name) for name in names)
     return inner_splits(judging) if choices > 1 and rules.primary is None else []
 
@@ -166,7 +166,7 @@ def _scores(
     jobs: int,
     progress: Callable[[str], None],
 ) -> dict[int, dict[str, list[list[float]]]]:
-    """Return the inner scores per target and eligible method."""
+    """Return the RMS on each inner split, per target and eligible method."""
     kept = [name for name in names if deployable(name)]
     pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
     found: dict[int, dict[str, list[list[float]]]] = {
@@ -188,7 +188,7 @@ def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: 
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:
-    """Split an assessment into its thermal cycles; results that need a separate replay stay with the whole."""
+    """Split an assessment into its thermal cycles; results that need a separate replay are not split."""
     found = []
     blocks = [b for b in join_short_cycles(whole.cycle, whole.test) if np.isin(whole.cycle, b).sum() >= MIN_ROWS]
     for unit, block in zip(whole.verdict.units, blocks, strict=True):

@@ -1,11 +1,11 @@
-"""Conditions covered by the judged units, for which an honest error is valid, and the similarity of these units.
+"""Conditions covered by the judged blocks (cycles or files), and the similarity of these blocks.
 
-Similarity: each unit's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts of
-its duration. The squared distance of two units is the mean square difference over these parts, summed over the inputs
-of a quantity and divided by their summed variance over all judged rows, averaged over the quantities; plus the squared
-logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle sensor does
-not make two units different. Two units with a distance below `ALIKE` are alike: a copy of a unit, or the same program
-on a similar day, adds no information. Alike units count once (single linkage).
+Similarity: each block's inputs (as recorded, so that the ambient temperature counts) are averaged over `PLACES` parts
+of its duration. The squared distance of two blocks is the mean square difference over these parts, summed over the
+inputs of a quantity and divided by their summed variance over all judged rows, averaged over the quantities; plus the
+squared logarithm of the ratio of their durations. So sensors are weighted by their variation: the noise of an idle
+sensor does not make two blocks different. Two blocks with a distance below `ALIKE` are alike: a copy of a block, or the
+same program on a similar day, adds no information. Alike blocks count once (single linkage).
 """
 
 from collections.abc import Sequence
@@ -20,16 +20,16 @@ from thermocomp.judging.splits import Judging
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 
-#: distance below which two units are alike [standard deviations of the inputs]
+#: distance below which two blocks are alike [standard deviations of the inputs]
 ALIKE = 0.1
-#: number of parts of a unit that are compared
+#: number of parts of a block that are compared
 PLACES = 32
 #: speeds that differ by less than this fraction of the largest are merged
 _SAME_SPEED = 0.02
 
 
 def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recording] = ()) -> Validity:
-    """Return the conditions covered by the units of a judging scheme."""
+    """Return the conditions covered by the blocks (cycles or files) of a judging scheme."""
     blocks = [rows for split in judging.splits if (rows := split.judge & samples.valid).any()]
     judged = np.any(blocks, axis=0) if blocks else np.zeros(len(samples), dtype=np.bool_)
     distances = unit_distances(samples, blocks)
@@ -51,12 +51,12 @@ def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recor
 
 
 def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
-    """Return the distances between all units, (n_units, n_units); see the module docstring.
+    """Return the distances between all blocks, (n_units, n_units); see the module docstring.
 
     Parameters
     ----------
     blocks : sequence of ndarray of bool of shape (n_rows,)
-        Rows of each unit; every input must be finite in them.
+        Rows of each block; every input must be finite in them.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def unit_distances(samples: Samples, blocks: Sequence[BoolArray]) -> FloatArray:
 
 
 def _curve(values: FloatArray, steps: FloatArray) -> FloatArray:
-    """Return the means of a unit's inputs in `PLACES` parts of its duration, (n_places, n_inputs)."""
+    """Return the means of a block's inputs in `PLACES` parts of its duration, (n_places, n_inputs)."""
     time = np.cumsum(steps)
     part = np.minimum((PLACES * time / max(time[-1], 1e-9)).astype(np.intp), PLACES - 1)
     known, at = np.unique(part, return_inverse=True)

@@ -1,8 +1,8 @@
-"""The do-no-harm gate: accepted, unproven or refused, by independent units.
+"""The do-no-harm gate: a model is accepted, unproven or refused, by its errors on independent cycles or files.
 
-A unit is a thermal cycle or a file that the model has not seen: rows of a drift depend on each other, units do not. A
-model is better if the logarithm of the ratio of its error to that of every baseline is below zero by a one-sided t-test
-over units; it is harmful if it is much worse than no compensation in a single unit. For the reasons see
+The thermal cycles or files are unseen by the model; they are independent, unlike the rows of a drift. A model is better
+if the logarithm of the ratio of its error to that of every baseline is below zero by a one-sided t-test over these
+cycles or files; it is harmful if it is much worse than no compensation in a single one. For the reasons see
 ``docs/decisions/0020-verdict.md``.
 """
 
@@ -21,7 +21,7 @@ from thermocomp.judging.splits import MIN_ROWS
 
 Word = Literal["accepted", "unproven", "refused"]
 
-#: minimum number of units for a significance test
+#: minimum number of cycles or files for a significance test
 MIN_UNITS = 3
 #: lower bound of the noise of a probe [um]
 NO_NOISE = 1e-3
@@ -34,11 +34,11 @@ NAMES = (*BASELINES, "none, both re-zeroed at the start of the block")
 REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
-#: the margin is the larger of this multiple of the probe's noise and this fraction of the largest training drift
+#: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
 TIMES_NOISE, SHARE = 3.0, 0.05
-#: cap on acceptance where noise and lost sensors were not tried
+#: reason against acceptance if the effects of noise and lost sensors were not tested
 UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
-#: a unit that moves by less than this fraction of the largest training drift is not informative
+#: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
 MOVES = 0.1
 
 
@@ -61,7 +61,7 @@ class JudgedUnit:
     moves : bool
         Whether the deviation changes enough to distinguish a model from a constant.
     rezeroed : tuple of (float, float) or None
-        RMS with and without the model, both relative to the start of the unit [um].
+        RMS with and without the model, both relative to the start of the cycle or file [um].
     """
 
     name: str
@@ -77,7 +77,7 @@ class JudgedUnit:
 
     @property
     def none_rms(self) -> float:
-        """RMS without compensation [um]."""
+        """RMS without compensation in this cycle or file [um]."""
         return self.baselines[0]
 
     @property
@@ -100,7 +100,7 @@ class JudgedUnit:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Decision of the gate over several units.
+    """Decision of the do-no-harm gate over several cycles or files.
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ class Verdict:
     tried : int
         Number of methods tried for this target.
     p : float or None
-        P-value of the test, corrected for the number of methods; None: computed from the units.
+        P-value of the test, corrected for the number of methods; None: computed from the errors.
     about : str
         Reason why the p-value is not corrected for the number of methods; empty if it is.
     names : tuple of str
         Names of the baselines.
     stated : float or None
-        Tolerated degradation as stated by the user before judging; None: by rule.
+        Tolerated degradation as set by the user before the evaluation; None: calculated by `margin_of`.
     """
 
     units: tuple[JudgedUnit, ...]
@@ -134,7 +134,7 @@ class Verdict:
 
     @cached_property
     def p_values(self) -> tuple[float, ...]:
-        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` units."""
+        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` cycles or files."""
         if len(self.units) < MIN_UNITS:
             return (1.0,) * len(self.names)
         ratios = np.array([u.log_ratios for u in self.units])
@@ -151,7 +151,7 @@ class Verdict:
 
     @property
     def p_value(self) -> float:
-        """The decisive p-value."""
+        """P-value that decides the verdict: that for the baseline that is hardest to beat."""
         return self.p_values[self.worst] if self.p is None else self.p
 
     @property
@@ -182,7 +182,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Reason for the verdict in one sentence, with the decisive unit or baseline."""
+        """Reason for the verdict in one sentence, with the decisive cycle, file or baseline."""
         if self.refusal or not self.units:
             return self.refusal or f"every cycle has fewer than {MIN_ROWS} rows of validation data"
         stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
@@ -227,7 +227,7 @@ class Verdict:
 
     @property
     def advice(self) -> str:
-        """Test that would decide an unproven verdict; empty for the other verdicts."""
+        """Thermal test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
         if any("are distinct" in cap for cap in self.caps):
@@ -245,7 +245,7 @@ class Verdict:
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
-        """Return the number of units of this kind that would suffice for acceptance; None if it exceeds 50."""
+        """Return the number of cycles or files with such errors that would suffice for acceptance; None if over 50."""
         ratios = np.array([u.log_ratios[self.worst] for u in self.units])
         effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
         for n in range(len(ratios) + 1, 51):
@@ -275,14 +275,14 @@ def measure(
     margin: float | None = None,
     stretch: bool = False,
 ) -> JudgedUnit:
-    """Return the results in one unit.
+    """Return the results of a model in one unseen cycle or file.
 
     Parameters
     ----------
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
     margin : float, optional
-        Tolerated degradation [um], stated before judging; see `margin_of`.
+        Tolerated degradation [um], set before the evaluation; see `margin_of`.
     """
     residual = measured - predicted
     size = Size.of(residual)
@@ -304,7 +304,7 @@ def measure(
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
-    """Return the verdict over the units of several verdicts; any refusal or cap applies to the whole."""
+    """Return the verdict over the cycles or files of several verdicts, with all reasons against acceptance."""
     return Verdict(
         units=tuple(u for v in parts for u in v.units),
         unit=parts[0].unit,
@@ -316,7 +316,7 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 
 
 def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the default of the tolerated degradation in a single unit [unit]."""
+    """Return the default of the tolerated degradation in a single cycle or file [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
 
 

@@ -26,7 +26,7 @@ class Fault(NamedTuple):
     """A period in which a temperature was not trusted."""
 
     sensor: str
-    word: str  #: missing, stepped, stuck or off
+    word: str  #: missing, stepped, stuck or off (deviates from its prediction)
     begin: float  #: time of detection, on the clock of its recording [s]
     end: float  #: time when it was trusted again, or end of the recording [s]
     returned: bool  #: whether it was trusted again
@@ -35,7 +35,7 @@ class Fault(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FaultLog:
-    """Findings of a watch in a recording.
+    """Findings of a watch (sensor monitoring) in a recording.
 
     Parameters
     ----------

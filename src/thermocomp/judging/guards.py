@@ -1,4 +1,4 @@
-"""Inputs of models during sensor failures in the presence of a watch: the readings that the watch passes."""
+"""Inputs of models during sensor failures: the readings that the watch (sensor monitoring) passes on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,25 +19,25 @@ FEW = 6
 
 @dataclass(frozen=True)
 class Guard:
-    """Readings that a watch passes while sensors read their zero from the start of each test (C-34).
+    """Readings that a watch passes on while sensors read their zero from the start of each test (C-34).
 
     Parameters
     ----------
     readings : dict of (tuple of str) to dict of int to ndarray of shape (n_rows,)
-        By failed sensors, then by column of the samples: the passed readings, if any differs from the recorded ones.
+        By failed sensors, then by column of the samples: the readings passed on, if any differs from the recorded ones.
     """
 
     watch: Watch
     readings: dict[tuple[str, ...], dict[int, FloatArray]]
 
     def among(self, place: Sequence[int]) -> "Guard":
-        """Return the guard for samples with more inputs, with each column moved to its `place`."""
+        """Return the guard for samples with more inputs: `place` gives the new index of each column."""
         moved = {lost: {place[c]: v for c, v in of.items()} for lost, of in self.readings.items()}
         return Guard(self.watch, moved)
 
 
 def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | None:
-    """Return the readings that a watch passes while each temperature, or with few temperatures each pair, fails.
+    """Return the readings that a watch passes on while each temperature, or with few temperatures each pair, fails.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_guard(samples: Samples, learn: BoolArray, rows: BoolArray) -> Guard | N
 
 
 def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
-    """Return the readings that a given watch passes while each temperature, or with few temperatures each pair, fails.
+    """Return the readings that a given watch passes on while each temperature, or each pair of a few, fails.
 
     Parameters
     ----------

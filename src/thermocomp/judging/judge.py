@@ -58,7 +58,7 @@ def judge(
     limits : Limits or None
         Limits of the compensator; None: the model alone is judged.
     guard : Guard, optional
-        Readings that a watch, trained without the block, passes while sensors fail. Default: failures go undetected.
+        Readings that a watch, trained without the block, passes on while sensors fail. Default: failures go undetected.
     widening : ndarray of shape (n_rows,), optional
         See `replay_compensated`.
     """
@@ -140,14 +140,14 @@ def _verdict(
 
 
 def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return the worse result in a unit, of compensator or model alone: no model is accepted because of limits."""
+    """Return the worse result in a cycle or file, of compensator or model: no model is accepted because of limits."""
     ran, alone = both
     rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
     return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
 
 
 def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return a cap if the units are too alike to count separately; empty if they are not."""
+    """Return a reason against acceptance if the judged cycles or files are too alike; empty if they are not."""
     covered = find_validity(samples, judging)
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:

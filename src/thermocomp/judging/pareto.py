@@ -22,7 +22,7 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
 
     Notes
     -----
-    Without a set better than no compensation, the choice has no sensors, and `Choice.failure` states the reason.
+    If no set is better than no compensation, no sensors are selected, and `Choice.failure` states the reason.
     """
     candidates = [Candidates.of(samples, t) for t in range(len(samples.targets))]
     most = settings.most("pareto")
@@ -95,7 +95,7 @@ def _failed(found: Budget) -> str:
 
 
 def _rms(found: Budget) -> str:
-    """Return the name of the compared figure: a block's RMS, or its mean over the blocks."""
+    """Return the name of the compared metric: the RMS of a block, or its mean over the blocks."""
     if len(found.blocks) == 1:
         return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
     return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"
@@ -292,7 +292,7 @@ def trade_off(found: Budget, model: str, place: int) -> str:
 
 
 def _rule(found: Budget) -> str:
-    """Return the rule for the number of sensors, with numbers."""
+    """Return the rule by which the number of sensors was selected, with its numbers, as text."""
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins

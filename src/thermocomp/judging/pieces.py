@@ -20,7 +20,7 @@ elsewhere: ContextVar[Callable[[Any, Sequence[Any], Any], Iterator[Any]] | None]
 
 
 def return_reason(_piece: Any, why: str) -> Any:
-    """Return the reason for a failure in place of the result."""
+    """Return the reason for the failure of a task as its result."""
     return why
 
 
@@ -69,7 +69,7 @@ def attempt(work: Callable[[_Piece], _Found], piece: _Piece, failed: Callable[[_
 
 
 def explain(error: BaseException) -> str:
-    """Return the reason for a failure in one line; with the type of exceptions that are not of thermocomp."""
+    """Return the reason for a failure in one line, with the type of the exception if it is not one of thermocomp's."""
     if isinstance(error, ThermocompError):
         return str(error)
     if isinstance(error, BrokenProcessPool):

@@ -1,4 +1,4 @@
-"""Probings of a test: their schedule and their effect."""
+"""Probings (measurements of the tool point) during a test: their schedule and their effect."""
 
 import re
 from dataclasses import dataclass, replace
@@ -102,7 +102,7 @@ class Probings:
 
     @property
     def words(self) -> str:
-        """Name of the probings in all outputs."""
+        """Short description of the probings, as in all outputs."""
         often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
         return f"a probing every {often}"
 
@@ -130,7 +130,7 @@ class Probed:
     refused: tuple[str, ...] = ()
 
     def take(self, rows: BoolArray) -> "Probed":
-        """Return the effect in some of the rows."""
+        """Return the effect of the probings in selected rows."""
         return replace(self, at=self.at[rows], shift=self.shift[rows], without=self.without[rows])
 
     def held(self, measured: FloatArray, test: NDArray[np.intp]) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Recommended method: chosen anew without each unit in turn, so that the choice itself is judged.
+"""Recommended method: selected again in each fold, with the left-out block (cycle or file) excluded.
 
-The error of a choice among methods is not the error of the method with the best result: the best of twenty is partly
-luck. Therefore the choice is repeated for every left-out unit, by the error on units left out of the others (nested
-cross-validation, Varma and Simon 2006), and the method chosen is judged on the left-out unit.
+The error of a selection among methods is not the error of the method with the best result: the best of twenty is partly
+luck. Therefore the selection is repeated for every left-out block, by the cross-validation error on the other blocks
+(nested cross-validation, Varma and Simon 2006), and the selected method is judged on the left-out block.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,23 +15,23 @@ from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
 
-#: up to this number of units every pair is left out; above, the other units are left out in `GROUPS` groups per unit
+#: up to this number of blocks every pair is left out; with more, the others are left out in `GROUPS` groups per block
 PAIRS = 8
 GROUPS = 3
-#: minimum number of units for a choice
+#: minimum number of blocks for a selection
 LEAST = 3
 
 
 @dataclass(frozen=True)
 class Inner:
-    """An inner split, with the pairs of units that it scores.
+    """An inner split, with the pairs of blocks for which it gives an error.
 
     Parameters
     ----------
     split : Split
-        Its `judge` marks all rows that are left out: those of the outer unit and of the inner unit or units.
+        Its `judge` marks all rows that are left out: those of the outer block and of the inner block or blocks.
     scores : tuple of (int, int)
-        (outer left-out unit, inner unit) pairs for which it gives an error.
+        Pairs (outer left-out block, inner block) for which it gives an error.
     """
 
     split: Split
@@ -39,7 +39,7 @@ class Inner:
 
 
 def inner_splits(judging: Judging) -> list[Inner]:
-    """Return the inner splits needed to choose a method without each unit."""
+    """Return the inner splits needed to select a method with each block left out in turn."""
     splits = judging.splits
     n = len(splits)
     if n < LEAST:
@@ -63,7 +63,7 @@ def _inner(splits: Sequence[Split], out: Sequence[int], scores: tuple[tuple[int,
 
 
 def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str, Inner]) -> list[float]:
-    """Return a method's RMS for each score of an inner split.
+    """Return the RMS of a method for each of the `scores` of an inner split.
 
     Returns
     -------
@@ -82,14 +82,14 @@ def score(samples: Samples, by_target: Sequence[Judging], piece: tuple[int, str,
 
 @dataclass(frozen=True)
 class Recommendation:
-    """The recommended method for a target, and the verdict on the procedure of choosing.
+    """The recommended method for a target, and the verdict on the selection procedure.
 
     Parameters
     ----------
     chosen : tuple of str
-        Method chosen without each unit.
+        Method selected with each block left out.
     verdict : Verdict
-        Verdict on the choice: each unit is predicted by the method chosen without it.
+        Verdict on the selection: each block is predicted by the method selected with this block left out.
     """
 
     target: str
@@ -110,7 +110,7 @@ def recommend(
     Returns
     -------
     Recommendation or None
-        None if there are too few units or too few methods for a choice.
+        None if there are too few blocks or too few methods for a selection.
     """
     if not inners or not methods:
         return None
@@ -130,7 +130,7 @@ def recommend(
 
 
 def _log(verdict: do_no_harm.Verdict) -> float:
-    """Return the logarithm of a method's error on a unit; infinite if it failed, nan if there were too few rows."""
+    """Return the logarithm of a method's error on a block; infinite if it failed, nan if there were too few rows."""
     if not verdict.units:
         return np.inf if verdict.refusal else np.nan
     return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))

@@ -21,7 +21,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guard: Guard | None = None) -> Assessment:
-    """Return an assessment with the robustness of the written model, where that is worse."""
+    """Return an assessment with the robustness of the model in the model file, where that is worse."""
     if judged.robustness is None:
         return judged
     k = [t.name for t in samples.targets].index(model.target)
@@ -53,7 +53,7 @@ def _not_refitted(judged: Assessment, why: str) -> Assessment:
 
 
 def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
-    """Return a method fitted to all rows, for its formula."""
+    """Return the frozen model of a method fitted to all rows."""
     return train(method, samples, target, np.ones(len(samples), dtype=np.bool_)).model
 
 

@@ -261,7 +261,7 @@ def stack_for(model: ErrorModel, recordings: Sequence[Recording], starts: Start 
 
 
 def _window(model: ErrorModel, samples: Samples, readings: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first readings, from which a zero is averaged."""
+    """Return the first readings of a test, which are averaged for its zero."""
     return readings[: first_rows(model.zeroing, samples.time[readings], samples.stands[readings])[0]]
 
 

@@ -1,4 +1,4 @@
-"""Rules and results of judging."""
+"""Rules of an evaluation, and its results: `Assessment` and `Comparison`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,16 @@ from thermocomp.recordings.starts import Start
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules stated before judging.
+    """Rules set before the evaluation.
 
     Parameters
     ----------
     margin : float or None
-        Tolerated degradation in a single unit [unit of the target]; None: by `do_no_harm.margin_of`.
+        Tolerated degradation in a single cycle or file [unit of the target]; None: calculated by
+        `do_no_harm.margin_of`.
     primary : str or None
-        Method under test: unlike all others, its verdict is not corrected for the number of methods.
+        Primary method: its verdict is found without a correction for multiple comparisons, those of the others with
+        one.
     """
 
     margin: float | None = None
@@ -40,7 +42,7 @@ class Rules:
             raise InputError(f"margin {self.margin}: expected a finite number that is not negative")
 
     def check(self, names: Sequence[str]) -> None:
-        """Raise `InputError` if the primary method is not among those compared."""
+        """Raise `InputError` if the primary method is not among the methods compared."""
         if self.primary is not None and self.primary not in names:
             raise InputError(
                 f"primary method {self.primary!r} is not among the compared methods; compared are {', '.join(names)}"
@@ -70,7 +72,7 @@ class Assessment:
     failure : str
         Reason why the method could not be fitted; empty if it could.
     caveat : str
-        Reason why the test is not honest, whatever the errors; empty if it is.
+        Reason why the result is not an honest error, such as training rows among the judged ones; empty if it is.
     overall : bool
         True for the final result of this model and target, over all judged data instead of one cycle.
     n_sensors : tuple of (int, int)
@@ -138,12 +140,12 @@ class Assessment:
 
     @property
     def _banded(self) -> NDArray[np.bool_]:
-        """Judged rows with a band."""
+        """Mask of the judged rows that have an uncertainty band."""
         return np.zeros(0, np.bool_) if self.half_widths is None else np.isfinite(self.half_widths)
 
     @property
     def deployable(self) -> bool:
-        """Whether its method can be frozen, so that it may run at a machine."""
+        """True if the method can be frozen and may run at a machine."""
         return deployable(self.model)
 
     def metric(self, name: str) -> float:
@@ -151,12 +153,12 @@ class Assessment:
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, self.predicted)
 
     def alone_metric(self, name: str) -> float:
-        """Return a metric of the model alone, without gate and limits."""
+        """Return the value of a metric for the model alone, without gate and limits."""
         alone = self.predicted if self.alone is None else self.alone
         return float("nan") if self.failure else metrics.METRICS[name](self.measured, alone)
 
     def unprobed_metric(self, name: str) -> float:
-        """Return a metric of the compensator without probings."""
+        """Return the value of a metric for the compensator without probings."""
         return metrics.METRICS[name](self.measured, self.predicted if self.probed is None else self.probed.without)
 
     @property
@@ -167,12 +169,12 @@ class Assessment:
         return metrics.METRICS["rms"](self.measured, self.alone)
 
     def held_metric(self, name: str) -> float:
-        """Return a metric of probings alone, each held until the next; without probings, of no compensation."""
+        """Return a metric for compensation by probings alone, each held until the next; without probings, for none."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
         return metrics.METRICS[name](self.measured, held)
 
     def none_metric(self, name: str) -> float:
-        """Return a metric without compensation."""
+        """Return the value of a metric without compensation."""
         return (
             metrics.METRICS[name](self.measured, np.zeros_like(self.measured)) if self.measured.size else float("nan")
         )

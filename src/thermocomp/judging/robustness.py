@@ -147,7 +147,7 @@ def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustnes
 
 @dataclass(frozen=True)
 class Replayed:
-    """Undisturbed prediction, and the effect of disturbances."""
+    """Prediction with undisturbed readings, and RMS errors with disturbed ones."""
 
     predicted: FloatArray
     outside: BoolArray

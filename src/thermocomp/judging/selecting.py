@@ -46,7 +46,7 @@ def select(
     jobs: int = 1,
     progress: Progress = lambda _, steps=1: None,  # noqa: ARG005
 ) -> tuple[Choice, ...]:
-    """Select sensors for every target."""
+    """Select sensors for every target by one of the selection methods."""
     if elsewhere.get() is not None and method not in SHARED:
         raise InputError(f"{method} does not support a scheduler (only {' and '.join(SHARED)} do); omit the scheduler")
     if method == "pareto":

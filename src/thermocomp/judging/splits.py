@@ -24,7 +24,7 @@ class Split:
         Name of the unseen block.
     learn, judge : ndarray of bool of shape (n_rows,)
     whole : bool
-        The gate judges the block as one unit; otherwise each thermal cycle in it.
+        The do-no-harm gate judges the block as a whole; otherwise each thermal cycle in it.
     stretch : bool
         The block continues the training data: its cycles are not independent of them.
     """
@@ -37,7 +37,7 @@ class Split:
 
     @property
     def name(self) -> str:
-        """Name of the left-out unit, without its kind."""
+        """Name of the left-out cycle, day or file, without its kind."""
         return self.block.partition(" ")[2]
 
 
@@ -140,7 +140,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
-    """Judge on each file in turn, train on all others; each file is judged as one unit."""
+    """Judge on each file in turn, train on all others; each file is judged as a whole."""
     n = len(samples.test_names)
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings, found one")

@@ -1,4 +1,4 @@
-"""Samples as a model's watch passes them: values of failed sensors are replaced, and the band is wider."""
+"""Samples after a model's watch (sensor monitoring): values of failed sensors are replaced, and the band is wider."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ from thermocomp.recordings.starts import Start
 def believe(
     model: ErrorModel, samples: Samples, rows: BoolArray, watched: Samples | None = None
 ) -> tuple[Samples, FloatArray]:
-    """Return samples as passed by a model's watch, and the widening of its band, in the tests of `rows`.
+    """Return samples as passed on by a model's watch, and the widening of its band, in the tests of `rows`.
 
     The samples are unchanged, and nothing is widened, without a watch, or without the speeds that the watch needs. Rows
     without a speed are passed on unchanged.
@@ -78,7 +78,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> tuple[NDArray[np.
     rows : ndarray of int of shape (n_rows,)
         Rows of the test.
     passed : ndarray of shape (n_rows, n_inputs)
-        Readings passed, in the order of the watch's inputs.
+        Readings passed on, in the order of the watch's inputs.
     faults : ndarray of int of shape (n_rows, n_sensors)
         See `thermocomp.runtime.watch.WORDS`.
     """

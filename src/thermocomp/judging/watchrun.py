@@ -1,4 +1,4 @@
-"""A watch over recorded readings, by the compiled program."""
+"""A watch (sensor monitoring) applied to recorded readings by the compiled program."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from thermocomp.runtime.program.tables import constants_of_watch
 def run_watch(
     watch: Watch, time: FloatArray, values: FloatArray, resting: BoolArray, reference: FloatArray | None = None
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Return the readings that a watch passes, and the state of each sensor; see `thermocomp.runtime.watch.look`.
+    """Return the readings that a watch passes on, and the state of each sensor; see `thermocomp.runtime.watch.look`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Clocks of the service."""
+"""Clock of the service: real time, or faster for a virtual machine."""
 
 import time
 

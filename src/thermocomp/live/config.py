@@ -32,7 +32,7 @@ from thermocomp.live.adapters.sections import (
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """Web page of the service.
+    """Configuration of the web page of the service.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Page:
 
 @dataclass(frozen=True, kw_only=True)
 class MachineOf:
-    """Machine file used instead of models: offset and slope of each axis, for lines through one point of the volume.
+    """Machine file used instead of models: offset and slope of each axis along straight lines through one point.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class MachineOf:
 
 @dataclass(frozen=True, kw_only=True)
 class JournalOut:
-    """Output of the journal.
+    """Configuration of the journal.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Config:
             raise SettingError("\n".join(found))
 
     def _wrong(self) -> Iterator[str]:
-        """Yield the settings that are missing or exclude each other."""
+        """Yield an error for each setting that is missing, or excludes another one."""
         if bool(self.models) == bool(self.machine):
             yield (
                 f"models = {list(self.models)}: name at least one model file written by 'thermocomp fit', or a "
@@ -207,7 +207,7 @@ class Config:
 
 
 def _place(one: SourceSection | SinkSection | Probings) -> str:
-    """Return the resource of a link, which no other link may share."""
+    """Return the resource that a source or sink needs for itself, such as a topic, a file or a socket."""
     if isinstance(one, OnBroker):
         return f"topic = {one.topic!r} of {one.host}:{one.port}"
     if isinstance(one, SimulatedIn | SimulatedProbing):
@@ -238,7 +238,7 @@ _PLAIN = {
 
 
 def read_config(path: str | Path) -> ServiceSettings:
-    """Read a configuration."""
+    """Read the configuration file of the service."""
     content = read_toml(path, "configuration of the service")
     if unfit := list(_unfit(content)):
         raise InputError(_list(path, unfit))

@@ -18,7 +18,7 @@ class Curves(deque[dict[str, float]]):
         self._heat = {i.name for m in compensator.models for i in m.inputs if i.quantity == "temperature"}
 
     def take(self, now: float, said: Compensated, latest: Latest) -> None:
-        """Append a row if the last one is old enough.
+        """Append a row of values if the interval since the last one has passed.
 
         Parameters
         ----------

@@ -22,11 +22,11 @@ class ConfirmedCorrections:
         self.confirmed = dict[str, tuple[Correction, float]]()
 
     def listens_to(self, sink: Sink) -> bool:
-        """Return whether confirmations of a sink are used."""
+        """Return whether a sink can confirm corrections and its confirmations are used."""
         return sink in self._sure
 
     def confirm(self, found: Mapping[str, Correction]) -> None:
-        """Store confirmed corrections."""
+        """Store corrections in force as confirmed by a controller."""
         self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:
@@ -48,7 +48,7 @@ class ConfirmedCorrections:
 def suspensions(
     sink: Suspending, in_force: Mapping[str, Correction], state: CompensatorState
 ) -> Iterator[tuple[str, Status | None]]:
-    """Yield targets suspended or resumed by a controller, with the resulting order; None: resumed."""
+    """Yield targets suspended or resumed by a controller, with their new status; None: resumed."""
     away = sink.suspended()
     for target in state.corrections.keys() & (in_force.keys() | away.keys()):
         order = state.orders.get(target)

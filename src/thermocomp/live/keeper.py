@@ -11,7 +11,7 @@ from thermocomp.live.clock import ServiceClock
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState, resume, silence
 
-#: reason of a target that is in shadow by configuration
+#: reason why a target runs in shadow: by configuration
 CONFIGURED = "by configuration"
 
 
@@ -35,7 +35,7 @@ class StateKeeper:
         self.not_saved = ""
 
     def begin(self) -> CompensatorState:
-        """Return the initial state: from the file, or a cold one."""
+        """Return the initial state of the compensator: from the file, or that of a cold start."""
         cold = self._compensator.start()
         if self._path is None:
             return cold
@@ -62,13 +62,13 @@ class StateKeeper:
         return state
 
     def put_aside(self) -> None:
-        """Rename a file that could not be used."""
+        """Rename a state file that could not be used."""
         if self._refused is not None:
             with contextlib.suppress(OSError):
                 self._refused.replace(self._refused.with_name(f"{self._refused.name}.refused"))
 
     def save(self, state: CompensatorState) -> None:
-        """Write the state; on failure `not_saved` contains the reason."""
+        """Write the state to the file; on failure `not_saved` contains the reason."""
         if self._path is None:
             self.not_saved = "no state file is configured"
             return

@@ -22,11 +22,11 @@ class Latest(dict[str, tuple[float, float]]):
 
     @property
     def left_out(self) -> int:
-        """Number of names not kept; `COUNTED` means that number or more."""
+        """Number of channel names that were not stored; `COUNTED` means that number or more."""
         return len(self._left_out)
 
     def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Store values; return the first name that was not kept, if all names were kept until then.
+        """Store values; return the first channel name that was not stored, if all were stored until then.
 
         Parameters
         ----------

@@ -91,7 +91,7 @@ class ProbingLedger:
         state: CompensatorState,
         recorder: Recorder | None,
     ) -> None:
-        """Store the results of probings."""
+        """Store the results of probings for display and roll-back."""
         for target, probing in probings.items():
             if target in said.deviations:
                 refused, after = said.refused.get(target, ""), state.learned.get(target)

@@ -89,7 +89,7 @@ class Link:
         raise NotImplementedError
 
     async def _lose(self) -> None:
-        """Clean up after the loss of the connection."""
+        """Clean up after the connection was lost; each kind of link defines what this means."""
 
 
 class Inlet(Link):

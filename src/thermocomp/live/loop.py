@@ -1,4 +1,4 @@
-"""The service: receives readings, runs the compensator, sends corrections; single failures do not stop it."""
+"""The service: receives readings, runs the compensator, sends corrections; a failed link does not stop it."""
 
 import asyncio
 import time

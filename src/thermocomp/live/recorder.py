@@ -1,4 +1,4 @@
-"""Recorder of the service for its journal."""
+"""Writes the readings, corrections and events of the service to its journal."""
 
 import math
 from collections.abc import Mapping
@@ -68,12 +68,12 @@ class Recorder:
         self._references: dict[str, Reference] = {}
 
     def take(self, time: float, values: Mapping[str, float], said: Compensated) -> None:
-        """Write a reading and its result."""
+        """Write a reading to the journal, and what it changed."""
         self.journal.add(ReadingRow(time, values))
         self.tell(time, said)
 
     def tell(self, time: float, said: Compensated) -> None:
-        """Write changed corrections and states."""
+        """Write the corrections and the status of targets that have changed."""
         before, self._before = self._before, said
         for target, correction in said.corrections.items():
             if before is None or before.corrections.get(target) != correction:
@@ -83,7 +83,7 @@ class Recorder:
                 self.journal.add(StateRow(time, target, status.word, status.reason))
 
     def count(self, time: float, references: Mapping[str, Reference]) -> None:
-        """Write the references of targets that have changed."""
+        """Write the zeros of targets that have changed."""
         for target, reference in references.items():
             if self._references.get(target) != reference:
                 self.journal.add(ReferenceRow(time, target, reference.why, reference.shift))

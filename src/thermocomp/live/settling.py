@@ -40,5 +40,5 @@ def minutes_until(times: Sequence[float], deviations: Sequence[float], below: fl
 
 
 def _at(times: Sequence[float], values: Sequence[float], time: float) -> float:
-    """Return the last value at a time."""
+    """Return the last value at or before a time."""
     return next(v for t, v in zip(reversed(times), reversed(values), strict=True) if t <= time)

@@ -25,7 +25,7 @@ KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
 
 #: maximum magnitude of an error [um]
 _LARGEST = 1e6
-#: fields of a watch that are instants
+#: fields of a watch state that are times
 _INSTANTS = ("since", "jumped", "off", "still", "moving", "back", "fast")
 
 
@@ -38,7 +38,7 @@ class _Stored:
 
 @dataclass(frozen=True)
 class Saved:
-    """A state and the time of writing.
+    """State of a compensator and the time at which it was written.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Saved:
 
 
 def fingerprint(compensator: Compensator) -> str:
-    """Return the fingerprint of the models of a compensator."""
+    """Return a hash of the models of a compensator, by which a state file is matched to them."""
     watches = [asdict(w) for w in compensator.watches]
     entries = [entry_of(m) for m in compensator.models]
     text = json.dumps([list(compensator.lines), entries, watches], sort_keys=True, default=str)
@@ -59,7 +59,7 @@ def fingerprint(compensator: Compensator) -> str:
 
 
 def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
-    """Return the text of a state file."""
+    """Return the text of a state file for a state of the compensator."""
     if written.tzinfo is None:
         raise InputError(f"state of a compensator: the time of writing {written} has no time zone")
     entry = {
@@ -71,7 +71,7 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
 
 
 def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
-    """Read the text of a state file."""
+    """Return the state in the text of a state file, or raise an error if it is damaged or of other models."""
     (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
     if stored.models != fingerprint(compensator):
         raise ModelFileError(
@@ -92,7 +92,7 @@ def write(state: CompensatorState, compensator: Compensator, path: str | Path, w
 
 
 def read(path: str | Path, compensator: Compensator) -> Saved:
-    """Read a state file."""
+    """Return the state in a state file; see `loads`."""
     text, source = jsonfile.read(KIND, path)
     return loads(text, compensator, source)
 

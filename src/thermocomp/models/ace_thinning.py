@@ -48,7 +48,7 @@ def thin(curves: Sequence[Curve], response: Curve, columns: Sequence[FloatArray]
 
 
 def sum_curves(curves: Sequence[Curve], columns: Sequence[FloatArray]) -> FloatArray:
-    """Add up exactly as the frozen model does, to the last bit."""
+    """Return the sum of curves, bit-identical to that in the frozen model."""
     total = np.zeros(len(columns[0]))
     for curve, x in zip(curves, columns, strict=True):
         total = total + curve(x)

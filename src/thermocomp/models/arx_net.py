@@ -27,7 +27,7 @@ SETTLED = 2000
 
 
 class _Net:
-    """A trained net with its scaling: single tick and free run."""
+    """A trained neural net with its scaling: computes one tick, or a free run."""
 
     def __init__(self, net: Perceptron, scale_in: Affine, scale_out: Affine, k: int, m: int) -> None:
         self.net, self.scale_in, self.scale_out, self.k, self.m = net, scale_in, scale_out, k, m
@@ -36,7 +36,7 @@ class _Net:
         return self.scale_out(self.net.evaluate(self.scale_in(regressors)))[..., 0]
 
     def ticked(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each tick."""
+        """Return the deviation at each tick in free run from a cold start."""
         k, n = self.k, len(run.drive)
         own = np.zeros(n + k)  # preceded by k ticks at rest
         driven = ticks.regressors(np.empty(0), run.drive, np.arange(n), 0, self.m, run.drive)
@@ -48,7 +48,7 @@ class _Net:
         return own[k:]
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each row of the test."""
+        """Return the deviation at each row of the test in free run from a cold start."""
         ticked = self.ticked(run)
         return ticks.interpolate_at_rows(
             run, ticked, lambda t, now: self.tick(ticks.regressors(ticked, run.drive, t + 1, self.k, self.m, now))
@@ -71,10 +71,10 @@ class _Net:
 class NetARX(ClockedRegressor):
     """Back-propagation net for dz(t) from dz(t-h) .. dz(t-kh) and n(t) .. n(t-mh) (P-03, E-P2).
 
-    The net is trained on measured displacements one step ahead, as in the paper, on the same clock as `ARX`; the number
-    of hidden nodes minimises the free-run error on left-out thermal cycles, which replaces the paper's trial and error.
-    Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end: it
-    cannot diverge. Raises `FitError` if there is no input or too few rows.
+    The net is trained on measured displacements one step ahead, as in the paper, at the same intervals as `ARX`; the
+    number of hidden nodes minimises the free-run error on left-out thermal cycles, which replaces the paper's trial and
+    error. Its sigmoid output keeps the free run within the trained displacements, extended by an eighth at either end:
+    it cannot diverge. Raises `FitError` if there is no input or too few rows.
 
     With ``time="none"`` every row is treated as a steady state, and the net is trained with k = m = 0.
 

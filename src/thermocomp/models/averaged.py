@@ -26,7 +26,7 @@ POWERS = (1.0, 5 / 3, 3.0)
 STOPPED = (10 * MINUTE, 30 * MINUTE, 90 * MINUTE, 270 * MINUTE)
 RUNNING = (5 * MINUTE, 15 * MINUTE, 45 * MINUTE, 135 * MINUTE)
 
-#: number of linear combinations that describe the spread of the structures in a frozen model
+#: number of linear combinations that describe the spread of the averaged regressions in a frozen model
 DIRECTIONS = 12
 
 
@@ -35,14 +35,15 @@ class AveragedDynamic(TimedRegressor):
     """Average of many ridge regressions on lagged temperatures and on states of the spindle speed.
 
     A few thermal cycles cannot determine the time constants of a machine: the set with the smallest error on a left-out
-    cycle is best by chance and does worse on the next. Therefore no single set is chosen. Each of many structures draws
-    at random some lags, the same for all temperatures, some speed states (`PacedDynamic`) and a ridge penalty. The
-    weights of all structures are averaged; structures with smaller errors on left-out half cycles (run or stop) have a
-    greater share. Since every structure is linear in the same states, their average is a single model of that form.
+    cycle is best by chance and does worse on the next. Therefore no single set is chosen. Each of many regressions
+    (structures) uses some lags, the same for all temperatures, some speed states (`PacedDynamic`) and a ridge penalty,
+    all selected at random. Their coefficients are averaged, with a greater weight for regressions with smaller errors
+    on left-out half cycles (run or stop). Since all are linear in the same states, their average is a single model of
+    that form.
 
-    Each ridge regression adds the covariance that noise of the sensors in use, including noise in the zero, causes in
-    the features: the limit of a regression on inputs with that noise. The model does not rely on differences that are
-    lost in noise.
+    Each ridge regression adds the covariance that sensor noise in use, including that of the zero (reference reading),
+    causes in the features, as a regression on very many noisy copies of the data would. The model does not rely on
+    differences that are lost in noise.
 
     Parameters
     ----------
@@ -60,9 +61,9 @@ class AveragedDynamic(TimedRegressor):
         Time constants of the speed states at rest and at top speed [s]; all pairs are used in which the time constant
         at top speed does not exceed that at rest.
     structures : int
-        Number of averaged structures.
+        Number of averaged regressions.
     random_state : int
-        Seed of the random draw.
+        Seed of the random selection.
     time : {'column', 'routed', 'none'} or None
         Source of the time, see `thermocomp.models.timed.TimedRegressor`; if None, `fit` raises an error.
 
@@ -76,12 +77,12 @@ class AveragedDynamic(TimedRegressor):
     top_speed_ : float
         Greatest speed in the training rows [1/min].
     cv_rms_ : float
-        Mean of the RMS errors on the left-out parts [unit of y].
+        Cross-validation error: mean of the RMS errors on the left-out parts [unit of y].
     chosen_by_ : str
         Description of the cross-validation folds.
     left_out_ : ndarray of shape (n_rows, 2)
-        Prediction for each training row by structures fitted without its cycle, and their spread [unit of y]; nan
-        elsewhere.
+        Prediction for each training row by regressions fitted without its cycle, and their standard deviation [unit of
+        y]; nan elsewhere.
     gain_ : ndarray of shape (n_inputs,)
         Magnitude of the response of y to a step of each temperature, after one row [unit of y per degC]; 0 for a speed.
 
@@ -189,7 +190,7 @@ class AveragedDynamic(TimedRegressor):
     def _leave_out(
         self, rows: FloatArray, step: FloatArray, folds: IntArray, weights: FloatArray, shares: FloatArray
     ) -> FloatArray:
-        """Return mean and spread of the structures, (n_rows, 2), with the weights (n_folds, ...) of each row's fold."""
+        """Return mean and spread of all regressions, (n_rows, 2), with the weights (n_folds, ...) of a row's fold."""
         found = np.full((len(rows), 2), np.nan)
         for own, table in self._features.tables(rows, step):
             for k, fitted in enumerate(weights):
@@ -235,14 +236,14 @@ class AveragedDynamic(TimedRegressor):
 
 
 def _main_directions(deviations: FloatArray, moments: Moments) -> FloatArray:
-    """Return a few linear combinations, (n_spread, n_features), that approximate the spread of the structures.
+    """Return a few linear combinations, (n_spread, n_features), that approximate the spread of the regressions.
 
     They are the principal directions of the spread, enlarged to make up for the omitted ones.
 
     Parameters
     ----------
     deviations : ndarray of shape (n_structures, n_features)
-        Weights minus their mean, times the square root of the structure's share.
+        Weights minus their mean, times the square root of the regression's weight in the average.
     """
     scale = np.sqrt(np.diag(moments.gram.sum(axis=0)) / moments.rows.sum())
     scale[scale == 0] = 1.0

@@ -37,7 +37,7 @@ def find_band(
     residual : ndarray of shape (n_rows,)
         Error on rows whose cycle was left out of the training [unit].
     spread : ndarray of shape (n_rows,)
-        Spread of the structures for these rows [unit].
+        Spread of the averaged regressions in these rows [unit].
     cycle : ndarray of int of shape (n_rows,)
     turning : ndarray of bool of shape (n_rows,)
         Whether the spindle turns.

@@ -132,10 +132,10 @@ class MemorylessRegressor(ThermalRegressor):
 
     @abstractmethod
     def _predict(self, change: FloatArray) -> FloatArray:
-        """Predict for checked rows, (n_rows, n_features)."""
+        """Return the prediction for validated rows, (n_rows, n_features)."""
 
     def _checked(self, X: ArrayLike) -> FloatArray:
-        """Check rows against the fitted features."""
+        """Validate rows: their features must be those of the fit."""
         check_is_fitted(self)
         change: FloatArray = validate_data(self, X, dtype=np.float64, reset=False)
         return change
@@ -145,7 +145,7 @@ class MemorylessRegressor(ThermalRegressor):
     ) -> tuple[FloatArray, FloatArray, IntArray, str]:
         """Check the training data, store the range of the training rows, and return only these rows.
 
-        Also return the fold of each row and a text that describes the units left out in turn.
+        Also return the fold of each row and a text that describes what is left out in turn.
         """
         change, deviation = self._read(X, y)
         folds, description = number_folds(cycle, len(change))
@@ -188,7 +188,7 @@ class StaticRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:
-        """Fit to checked data, (n_rows, n_features) and (n_rows,)."""
+        """Fit to validated data, (n_rows, n_features) and (n_rows,)."""
 
 
 class CycledRegressor(MemorylessRegressor):
@@ -230,4 +230,4 @@ class CycledRegressor(MemorylessRegressor):
 
     @abstractmethod
     def _fit(self, change: FloatArray, deviation: FloatArray, folds: IntArray) -> None:
-        """Fit to checked data; `folds` of shape (n_rows,), numbered 0, 1, ..., are left out in turn."""
+        """Fit to validated data; `folds` of shape (n_rows,), numbered 0, 1, ..., are left out in turn."""

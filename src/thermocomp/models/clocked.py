@@ -69,7 +69,7 @@ class Clocked:
 
     @classmethod
     def of(cls, inputs: FloatArray, y: FloatArray, dt: FloatArray, folds: IntArray, interval: float) -> "Clocked":
-        """Resample rows.
+        """Resample the rows of a test at a constant interval.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class Clocked:
 
     @property
     def largest_root(self) -> float:
-        """Upper bound on the roots of the polynomial."""
+        """Largest permitted modulus of the roots of the polynomial in past deviations."""
         longest = max(len(r.drive) - 1 for r in self.runs)
         return math.exp(-1.0 / (MEMORY * max(longest, 1)))
 
@@ -124,11 +124,11 @@ class Recursion(Protocol):
         """Return the deviation at which the model settles with the inputs of each row."""
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Return the free run through a test, at the rows."""
+        """Return the deviation in free run at each row of a test."""
 
 
 class ClockedRegressor(TimedRegressor):
-    """Base of the autoregressive estimators: selection of inputs and clock by cycles."""
+    """Base of the autoregressive estimators: the inputs used, and the selection by left-out thermal cycles."""
 
     inputs: Sequence[str | int] | None
     interval_: float
@@ -136,11 +136,11 @@ class ClockedRegressor(TimedRegressor):
     @property
     @abstractmethod
     def _recursion(self) -> Recursion:
-        """Fitted recursion."""
+        """The fitted recursion, which computes the free run."""
 
     @abstractmethod
     def _learn(self, inputs: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
-        """Fit to the columns of the inputs."""
+        """Fit the recursion to the inputs, (n_rows, n_inputs), and the deviation."""
 
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
         self._columns = self._resolve()
@@ -161,7 +161,7 @@ class ClockedRegressor(TimedRegressor):
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def _resolve(self) -> IntArray:
-        """Return the columns used as inputs."""
+        """Return the indices of the columns used as inputs."""
         if self.inputs is None:
             return np.arange(len(self._names()))
         if not len(self.inputs):

@@ -86,7 +86,7 @@ def _calibrated(states: FloatArray, cycle: IntArray, n_points: int) -> float:
 
 
 def _points(states: FloatArray, n_points: int) -> FloatArray:
-    """Return states that cover all: the one nearest to the mean, then repeatedly the one farthest from those chosen."""
+    """Return states that represent all: the one nearest to the mean, then repeatedly the farthest from those chosen."""
     pool = _thinned(states)
     taken = [int(np.argmin(((pool - pool.mean(axis=0)) ** 2).sum(axis=1)))]
     far = _nearest(pool, pool[taken])

@@ -17,9 +17,9 @@ from thermocomp.recordings.samples import Samples
 class Doubt:
     """Uncertainty of an average of ridge regressions, and the response of temperatures to the speed.
 
-    The covariance of the weights is that of the structures: they fit the rows equally well and differ where the rows
-    contain no information. Each part that is left out in turn (half a thermal cycle) counts as one observation with the
-    error found on it, because neighbouring rows are not independent.
+    The covariance of the weights is that between the averaged regressions: they fit the rows equally well and differ
+    where the rows contain no information. Each part that is left out in turn (half a thermal cycle) counts as one
+    observation with the error found on it, because neighbouring rows are not independent.
 
     Parameters
     ----------

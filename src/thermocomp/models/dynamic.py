@@ -38,7 +38,7 @@ SPEED_LAGS: tuple[tuple[float, ...], ...] = (
     (10 * MINUTE, 40 * MINUTE, 160 * MINUTE),
     (3 * MINUTE, 10 * MINUTE, 30 * MINUTE, 100 * MINUTE, 300 * MINUTE),
 )
-#: candidate ridge strengths, per row and relative to each feature's mean square
+#: candidate regularization strengths, per row and relative to each feature's mean square
 STRENGTHS: tuple[float, ...] = tuple(float(10.0 ** (k / 2)) for k in range(-12, 5))
 
 _CHUNK = 20_000  # feature rows held in memory at once: bounds the memory of a fit for any length of recording
@@ -59,11 +59,11 @@ class DynamicRidge(TimedRegressor):
 
     Temperature sensors and structure have different time constants, and the heat at a bearing increases more than
     proportionally with the speed; both effects become linear in first-order lags of the temperatures, of the speed and
-    of its square. The ridge strength and the set of time constants are chosen by cross-validation over thermal cycles,
-    within the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength whose mean
-    RMS is within one standard error of the smallest (one-standard-error rule of Breiman et al. 1984). Sets with a
-    temperature lag below `SHORTEST_LAG` times the time between two rows (median) are not tried; if no set remains, the
-    temperatures are not lagged.
+    of its square. The regularization strength and the set of time constants are chosen by cross-validation over thermal
+    cycles, within the data given to `fit`: the set with the smallest mean RMS, and within it the greatest strength
+    whose mean RMS is within one standard error of the smallest (one-standard-error rule of Breiman et al. 1984). Sets
+    with a temperature lag below `SHORTEST_LAG` times the time between two rows (median) are not tried; if no set
+    remains, the temperatures are not lagged.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ class DynamicRidge(TimedRegressor):
     copies : {'high-passed', 'lagged'}
         Quantity shrunk by the ridge: the temperature minus its lagged copy, or the lagged copy itself.
     strengths : sequence of float
-        Ridge strengths to choose from.
+        Regularization strengths to choose from.
     rule : {'one-standard-error', 'minimum'}
-        Rule for the choice of the strength.
+        Rule for the choice of the regularization strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
     time : {'column', 'routed', 'none'} or None
@@ -93,7 +93,7 @@ class DynamicRidge(TimedRegressor):
     temperature_lags_, speed_lags_ : tuple of float
         Chosen time constants [s].
     strength_ : float
-        Chosen strength.
+        Chosen regularization strength.
     cv_rms_ : float
         Mean of the RMS values of the left-out cycles with the chosen settings [unit of y].
     chosen_by_ : str
@@ -224,7 +224,7 @@ class DynamicRidge(TimedRegressor):
         return found
 
     def _features(self, X: FloatArray, dt: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """Yield the table of all features in chunks of rows."""
+        """Yield the table of all candidate features, in chunks of rows."""
         memory = None
         for start in range(0, len(X), _CHUNK):
             own = slice(start, start + _CHUNK)

@@ -39,7 +39,7 @@ class ForeignRegressor(UnfrozenRegressor):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """Name of the class, or of the steps of a Pipeline."""
+        """Class name of the estimator, or those of the steps of a Pipeline."""
         return title(self.estimator)
 
     def _fit(self, change: FloatArray, deviation: FloatArray) -> None:

@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import FloatArray
 from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 
-#: strengths to choose from, relative to the strength at which the last input is dropped
+#: regularization strengths to choose from, relative to that at which the last input is dropped
 SHARES: tuple[float, ...] = tuple(float(10.0 ** (-k / 10)) for k in range(41))
 _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; changing either has no visible effect
 
@@ -21,22 +21,22 @@ _TOL, _SWEEPS = 1e-5, 5_000  # dual gap as a share of the sum of squares of y; c
 class Lasso(PenalisedRegressor):
     """Lasso (Tibshirani 1996) on standardised inputs: selector and regression in one.
 
-    Uses scikit-learn's coordinate descent along the whole path; the strength is chosen by cross-validation over thermal
-    cycles.
+    Uses scikit-learn's coordinate descent along the whole path; the regularization strength is chosen by
+    cross-validation over thermal cycles.
 
     Parameters
     ----------
     rule : {'one-standard-error', 'minimum'}
-        Rule for the choice of the strength.
+        Rule for the choice of the regularization strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
     strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
+        Regularization strengths to choose from, relative to that at which the last input is dropped.
 
     Attributes
     ----------
     strength_ : float
-        Chosen strength.
+        Chosen regularization strength.
     selected_ : tuple of str
         Names of the inputs that were not dropped.
     cv_rms_, chosen_by_ : float, str
@@ -96,17 +96,17 @@ class Lasso(PenalisedRegressor):
 class ElasticNet(Lasso):
     """Elastic net (Zou and Hastie 2005): a lasso that keeps or drops collinear inputs together.
 
-    Uses scikit-learn's coordinate descent along the whole path; strength and L1 share are chosen by cross-validation
-    over thermal cycles.
+    Uses scikit-learn's coordinate descent along the whole path; the regularization strength and the L1 share are chosen
+    by cross-validation over thermal cycles.
 
     Parameters
     ----------
     rule : {'one-standard-error', 'minimum'}
-        Rule for the choice of the strength, within the best share.
+        Rule for the choice of the regularization strength, with the best L1 share.
     fit_intercept : bool
         False: the model returns zero in the reference state.
     strengths : sequence of float
-        Strengths to choose from, relative to the strength at which the last input is dropped.
+        Regularization strengths to choose from, relative to that at which the last input is dropped.
     l1_ratios : sequence of float
         L1 shares of the penalty to choose from; the rest of the penalty is quadratic. 1 gives the lasso.
 
@@ -115,7 +115,7 @@ class ElasticNet(Lasso):
     l1_ratio_ : float
         Chosen L1 share.
     strength_ : float
-        Chosen strength.
+        Chosen regularization strength.
     selected_ : tuple of str
         Names of the inputs that were not dropped.
     cv_rms_, chosen_by_ : float, str

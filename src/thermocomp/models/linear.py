@@ -79,7 +79,7 @@ class TermRegressor(MemorylessRegressor):
         self._keep(found, self._inputs_alone(), [(i,) for i in columns], tri.total)
 
     def _inputs_alone(self) -> list[Variable]:
-        """Return each input as a separate variable."""
+        """Return one variable per input."""
         return [Variable.single(name, i) for i, name in enumerate(self._names())]
 
     def _keep(self, found: Solution, variables: Sequence[Variable], terms: Sequence[Term], total: float) -> None:

@@ -1,4 +1,4 @@
-"""A method: name, summary, and construction of its estimator."""
+"""`Method`: name and summary of a modelling method, and construction of its estimator."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -23,7 +23,8 @@ class Method:
     speed : str
         Parameter of the estimator for the names of the spindle speeds; empty if there is none.
     takes : tuple of {'dt', 'cycle'}
-        Arguments of `fit` other than X and y. With ``dt`` the method has a memory and also receives non-training rows.
+        Arguments of `fit` other than X and y. With ``dt`` the method has a memory and also receives the inputs of rows
+        not used for training.
     settings : dict of str to object
         Parameters that differ from the estimator's defaults.
     """
@@ -37,7 +38,7 @@ class Method:
 
     @property
     def kind(self) -> type[ThermalRegressor]:
-        """Class of the estimator."""
+        """Class of the estimator, imported on first use."""
         module, _, name = self.estimator.partition(":")
         found: type[ThermalRegressor] = getattr(import_module(module), name)
         return found

@@ -1,4 +1,4 @@
-"""Methods by name: those of this package and those of plug-ins."""
+"""Modelling methods by name: those of this package and those of plug-ins."""
 
 import warnings
 from collections.abc import Sequence

@@ -44,7 +44,7 @@ class HiddenCount:
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class SigmoidNet(NetRegressor):
-    """Chen's artificial neural network: i-h-o with sigmoids in hidden nodes and outputs, trained by backpropagation.
+    """Chen's neural network: sigmoids in one hidden layer and in the outputs, trained by backpropagation.
 
     Inputs and targets are scaled to 0.1 .. 0.9 (C-28), a constant channel to 0.5. Since a sigmoid stays between 0 and
     1, a prediction cannot leave the range of y by more than an eighth of that range at either end: the net saturates
@@ -140,7 +140,7 @@ class SigmoidNet(NetRegressor):
         cycle: ArrayLike | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> "SigmoidNet":
-        """Fit the net.
+        """Fit the neural net.
 
         Parameters
         ----------
@@ -214,7 +214,7 @@ class SigmoidNet(NetRegressor):
         left_out: str,
         progress: Callable[[str], None] | None,
     ) -> None:
-        """Choose the number of hidden nodes (C-26)."""
+        """Select the number of hidden nodes by cross-validation (C-26)."""
         counts = sorted({int(h) for h in np.atleast_1d(np.asarray(self.hidden))})
         if not counts:
             raise InputError("hidden: no number of hidden nodes to choose from; give at least one")

@@ -1,4 +1,4 @@
-"""`mlp-sklearn`: scikit-learn's net, for comparison."""
+"""`mlp-sklearn`: scikit-learn's multilayer perceptron, for comparison."""
 
 import warnings
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class SklearnNet(StaticRegressor, NetRegressor):
         Activation of the hidden nodes.
     solver : {'lbfgs', 'adam', 'sgd'}
     alpha : float
-        Strength of the penalty on squared weights.
+        L2 regularization strength.
     max_iter : int
         Maximum number of iterations of the solver.
     max_patterns : int

@@ -1,4 +1,4 @@
-"""Methods of this package."""
+"""Table of the modelling methods of this package."""
 
 from thermocomp.models.method import Method
 

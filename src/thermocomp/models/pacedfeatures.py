@@ -156,12 +156,12 @@ class PacedFeatures:
         return np.append(1.0, lagbank.step_response(usual_step(step), np.array(self.lags, dtype=np.float64)))
 
     def draw(self, count: int, random_state: int, keep: Sequence[int] | None = None) -> list[LagStructure]:
-        """Draw structures at random: copies (the same for all temperatures), speed states, and ridge penalties.
+        """Select regressions at random: their lags (the same for all temperatures), speed states, ridge penalties.
 
         Parameters
         ----------
         keep : sequence of int, optional
-            Indices in `temperatures` to use; default: all. The random draw does not depend on this.
+            Indices in `temperatures` to use; default: all. The random selection does not depend on this.
         """
         rng = np.random.default_rng(random_state)
         kept = np.arange(len(self.temperatures)) if keep is None else np.asarray(keep, dtype=np.intp)

@@ -221,7 +221,7 @@ def _smooth(u: FloatArray, r: FloatArray, penalty: float) -> _Smooth:
 
 
 def _bends(u: FloatArray) -> bool:
-    """Return whether a projection varies enough for a curve."""
+    """Return whether a projection varies by more than rounding, so that a curve can be fitted."""
     low, high = u.min(), u.max()
     return bool(high - low > 1e-12 * max(abs(low), abs(high)))
 

@@ -15,22 +15,22 @@ from thermocomp.models.shrinkage import PenalisedRegressor, sorted_strengths
 class Ridge(PenalisedRegressor):
     """Ridge regression (Hoerl and Kennard 1970) on standardised inputs: `dynamic` without memory.
 
-    Uses scikit-learn's `ridge_regression` by singular values; the strength is chosen by cross-validation over thermal
-    cycles.
+    Uses scikit-learn's `ridge_regression` by singular values; the regularization strength is chosen by cross-validation
+    over thermal cycles.
 
     Parameters
     ----------
     rule : {'one-standard-error', 'minimum'}
-        Rule for the choice of the strength.
+        Rule for the choice of the regularization strength.
     fit_intercept : bool
         False: the model returns zero in the reference state.
     strengths : sequence of float
-        Strengths to choose from, per row and relative to each input's variance.
+        Regularization strengths to choose from, per row and relative to each input's variance.
 
     Attributes
     ----------
     strength_ : float
-        Chosen strength.
+        Chosen regularization strength.
     cv_rms_, chosen_by_ : float, str
         See `thermocomp.models.shrinkage.ShrunkRegressor`.
 

@@ -75,7 +75,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
     time: Literal["column"] | None = None
 
     def fit(self, X: ArrayLike, y: ArrayLike, *, cycle: ArrayLike | None = None) -> "SensorSelector":
-        """Choose the sensors.
+        """Select the sensors.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         y : array-like of shape (n_rows,)
             Deviation.
         cycle : array-like of int of shape (n_rows,), optional
-            Thermal cycle of each row, for a method that chooses by left-out cycles.
+            Thermal cycle of each row, for a method that selects by left-out cycles.
 
         Returns
         -------

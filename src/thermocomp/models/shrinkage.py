@@ -139,12 +139,12 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
 
 
 class PenalisedRegressor(ShrunkRegressor):
-    """Linear regression with a penalty on the coefficients, whose strength is chosen by cross-validation.
+    """Linear regression with a penalty on the coefficients; its strength is chosen by cross-validation.
 
     Attributes
     ----------
     strength_ : float
-        Chosen strength.
+        Chosen regularization strength.
     """
 
     strengths: Sequence[float]
@@ -192,7 +192,7 @@ class ComponentRegressor(ShrunkRegressor):
 
 
 def sorted_strengths(strengths: ArrayLike) -> FloatArray:
-    """Return strengths in descending order, that is, from the simplest model to the most complex."""
+    """Return regularization strengths in descending order, that is, from the simplest model to the most complex."""
     values = np.atleast_1d(np.asarray(strengths, dtype=np.float64))
     if values.size == 0 or not (values > 0).all() or not np.isfinite(values).all():
         raise InputError(f"strengths {strengths!r}: expected positive numbers")

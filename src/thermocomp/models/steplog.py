@@ -59,10 +59,10 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
 
     @abstractmethod
     def _rule(self) -> Rule:
-        """Return the thresholds."""
+        """Return the thresholds for entering and deleting a term."""
 
     def _rule_text(self) -> str:
-        """Return the thresholds as text."""
+        """Return the thresholds for entering and deleting a term as text."""
         return str(self._rule())
 
     def _select(

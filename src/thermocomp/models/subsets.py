@@ -56,8 +56,8 @@ class BestSubset(TermRegressor):
 
     For every size the set with the smallest residual sum of squares is found exactly, or the certificate states "not
     proven" (`thermocomp.models.selection.subsets.best_subsets`). The size is chosen by the criterion. ``cycles``: the
-    search is repeated without each thermal cycle in turn, so that the cycle is unseen by the selection as well, and the
-    size with the smallest RMS over all left-out cycles is chosen.
+    search is repeated with each thermal cycle left out in turn, so that the cycle is unseen by the selection as well,
+    and the size with the smallest RMS over all left-out cycles is chosen.
 
     ``mse``, ``adjr2``, ``cp`` and ``bic`` treat the rows as independent. The rows of a time series are not (E-C12), and
     all four, including BIC, then select far too many temperatures; prefer ``cycles``.

@@ -109,7 +109,7 @@ class TimedRegressor(ThermalRegressor):
 
     @abstractmethod
     def _fit(self, rows: FloatArray, deviation: FloatArray, step: FloatArray, folds: IntArray) -> None:
-        """Fit to checked data: inputs without the time, y, time steps [s], and folds (-1: not used for training)."""
+        """Fit to validated data: inputs without the time, y, time steps [s], and folds (-1: not used for training)."""
 
     def predict(self, X: ArrayLike, *, dt: ArrayLike | None = None) -> FloatArray:
         """Predict the deviation from a cold start of each test; never from measured deviations (P-05).
@@ -130,7 +130,7 @@ class TimedRegressor(ThermalRegressor):
 
     @abstractmethod
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:
-        """Predict from inputs without the time, and time steps [s]."""
+        """Return the prediction for inputs without the time column, and time steps [s]."""
 
     def score(
         self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, *, dt: ArrayLike | None = None
@@ -240,7 +240,7 @@ class TimedRegressor(ThermalRegressor):
 
     @property
     def _hidden(self) -> int:
-        """Number of columns of X before the inputs."""
+        """Number of columns of X before the inputs: 1 if the first one is the time, else 0."""
         return int(self.time == "column")
 
 

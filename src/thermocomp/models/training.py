@@ -33,7 +33,7 @@ from thermocomp.recordings.samples import Samples
 
 @dataclass(frozen=True)
 class Trained:
-    """A fitted method.
+    """A fitted estimator and its frozen model.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ class FittedMethod:
     predicted : ndarray of shape (n_rows,)
         Predictions for every row; nan where an input is missing.
     left_out : ndarray of shape (n_rows, 2) or None
-        Prediction for each row by a model without that row's cycle, and the spread of its structures; nan for rows not
-        used for training. None: not provided by the method.
+        Prediction for each row by a model trained without that row's cycle, and the spread of its averaged regressions;
+        nan for rows not used for training. None: not provided by the method.
     """
 
     how: Method

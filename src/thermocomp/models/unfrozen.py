@@ -26,7 +26,7 @@ class UnfrozenRegressor(StaticRegressor):
 
     @abstractmethod
     def _bulk(self) -> str:
-        """Return the reason why it cannot be frozen, as text."""
+        """Return the reason why the regressor cannot be frozen, as text."""
 
     def unfrozen(self, *, inputs: Sequence[Input] | None = None, **header: Any) -> "EstimatorModel":
         """Wrap the fitted estimator as a model for replay and validation only: not saved, exported or run live."""
@@ -72,7 +72,7 @@ class EstimatorModel(ErrorModel):
         check_is_fitted(self.estimator)
 
     def layers_with(self, further: Sequence[Node] = ()) -> Layers:  # noqa: ARG002 - an estimator is no expression
-        """Return the estimator in place of expressions."""
+        """Return an object that evaluates the estimator instead of compiled expressions."""
         return _Estimated(self)
 
     @property
@@ -93,7 +93,7 @@ class EstimatorModel(ErrorModel):
 
 
 class _Estimated(Layers):
-    """An estimator in place of expressions."""
+    """Evaluates an estimator instead of compiled expressions."""
 
     def __init__(self, model: EstimatorModel) -> None:
         super().__init__([], len(model.inputs))

@@ -17,11 +17,11 @@ from thermocomp.recordings.samples import Samples, usual_step
 
 #: noise assumed for the predicting temperatures, as in `averaged` [degC]
 NOISE = 0.2
-#: number of structures averaged for a prediction
+#: number of regressions averaged for a prediction
 STRUCTURES = 100
 #: limits are this many times the largest value observed in sound data, and larger with few cycles
 SAFETY = 1.5
-#: the same factor for jumps: an untried speed warms up faster
+#: the same factor for jumps: at a speed outside the training data, temperatures may rise faster
 FASTEST = 2.0
 #: lower bounds of the limits: deviation, change within a minute, movement while stuck, in addition to resolution [degC]
 OFF, JUMP, MOVED = 1.0, 0.8, 0.5

@@ -8,7 +8,7 @@ order of presentation:
 ``ours``
     Our result.
 ``holds``
-    Criterion: the name of a truth value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
+    Criterion: the name of a Boolean value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
     Default: ``holds`` among the facts of the entry; if there is none, the claim is a number for information.
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.
@@ -66,7 +66,7 @@ class Claims(Generic[_Found]):
         return tuple(claim for key in self._entries for claim in self.judged(key, found))
 
     def judged(self, key: str, found: _Found) -> list[Claim]:
-        """Return the claims of one entry, judged by the results."""
+        """Return the claims of one entry of the file, judged by the results."""
         entry = self._entries[key]
         function = self._facts.get(key)
         claims = []

@@ -169,7 +169,7 @@ def residual(model: ErrorModel, samples: Samples) -> FloatArray:
 
 @dataclass(frozen=True)
 class Errors:
-    """Error figures of a residual.
+    """Error metrics of a residual.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class Errors:
 
     @classmethod
     def of(cls, residual: FloatArray) -> "Errors":
-        """Return the error figures of a residual of any shape, ignoring nan; for no compensation pass the deviation."""
+        """Return the error metrics of a residual of any shape, ignoring nan; for no compensation pass the deviation."""
         e = residual[np.isfinite(residual)]
         return cls(*(m(e, 0.0 * e) for m in (metrics.rms, metrics.mae, metrics.max_abs, metrics.peak_to_peak)))
 
@@ -200,7 +200,7 @@ def described(residual: FloatArray, deviation: FloatArray) -> float:
 
 
 def errors_table(caption: str, residuals: Mapping[tuple[str, str], FloatArray]) -> StudyTable:
-    """Return a table with the error figures of each residual in a row.
+    """Return a table with a row of error metrics per residual.
 
     Parameters
     ----------

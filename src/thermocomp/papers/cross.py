@@ -134,7 +134,7 @@ def take_task(recordings: Sequence[Recording], target: str) -> Task:
 
 
 def judge(task: Task, methods: Sequence[str], progress: Progress = tell_nobody, *, jobs: int = 1) -> list[Row]:
-    """Judge methods on a task, starting with no compensation."""
+    """Judge methods on a task; the first row of the result is without compensation."""
     pieces, done = n_pieces(task.samples, methods, task.judging), 0
 
     def tell(what: str) -> None:
@@ -276,7 +276,7 @@ def _useful(rows: Sequence[Row]) -> Facts:
 
 
 def _overview(rows: Sequence[Sequence[Row]]) -> StudyTable:
-    """Return the overview table of X-03."""
+    """Return the overview table of all methods on all experiments (X-03)."""
     cells = [
         [first.method, *("-" if mine[k].failure else f"{mine[k].rms:.2f}" for mine in rows)]
         for k, first in enumerate(rows[0])

@@ -66,7 +66,7 @@ class Exhibits:
         return Figure(key, said.fill(entry["caption"]), panels, entry.get("columns", 1))
 
     def numbers(self, section: str, found: object, **facts: Any) -> dict[str, float]:
-        """Return the numbers of a section by name."""
+        """Return the key numbers of a section of the study, by name."""
         said = self._file.sentences(facts, found)
         values = {name: said.value(path) for name, path in self._file.content["numbers"][section].items()}
         return {name: float(len(v) if isinstance(v, Sized) else v) for name, v in values.items()}

@@ -35,7 +35,7 @@ class Sentences(Formatter):
         self._names, self._parts = names, parts
 
     def fill(self, template: str, *items: Any) -> str:
-        """Return a template filled in."""
+        """Return a template with its fields replaced by values."""
         return self.vformat(template, items, self._names)
 
     def value(self, name: str) -> Any:
@@ -60,7 +60,7 @@ class Sentences(Formatter):
         return self.fill(part) if value else "", first
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Return a value as text; the items of a list are joined."""
+        """Return the value of a field as text; the items of a list are joined."""
         if format_spec == "#":
             return str(len(value))
         if isinstance(value, Mapping):

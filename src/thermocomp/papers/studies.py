@@ -1,4 +1,4 @@
-"""Studies by name; each is imported on demand."""
+"""The studies of the papers by name; each is imported on demand."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -17,25 +17,25 @@ Progress = Callable[[float, str], None]
 
 
 def tell_nobody(_: float, __: str) -> None:
-    """Report no progress."""
+    """Ignore the reported progress of a study."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement or number of a paper, and the result here.
+    """A claim or a number of a paper, and the result here.
 
     Parameters
     ----------
     ids : tuple of str
         Identifiers of the requirements covered, such as ``C-34``.
     text : str
-        Statement of the paper, as a sentence that can be true or false.
+        Claim of the paper, as a sentence that can be true or false.
     paper : str
         Number printed in the paper, with its unit; "" if there is none.
     ours : str
         Result here.
     holds : bool or None
-        Whether the statement is true here; None: a number for information, which cannot be false.
+        Whether the claim is true here; None: a number for information, which cannot be false.
     finding : str
         Reason why it does not hold, or its limitation. Required for every claim that does not hold.
     again : tuple of bool
@@ -83,7 +83,7 @@ class PlotCurve:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Axes with curves.
+    """Panel of a figure: axes with curves.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class StudyTable:
-    """A table of a study."""
+    """A table of a study: caption, headings and rows."""
 
     caption: str
     header: Sequence[str]

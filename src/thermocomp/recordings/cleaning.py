@@ -40,12 +40,12 @@ class Step:
     reason: str = ""
 
     def apply(self, rows: Rows) -> Rows:
-        """Return the cleaned rows, with a note on the changes."""
+        """Return the rows after this cleaning step, with a note on the changes."""
         raise NotImplementedError
 
     @property
     def name(self) -> str:
-        """Name of the step in a message."""
+        """Name of the cleaning step in messages."""
         return f"[[clean]] do = {self.do!r}"
 
     def _refuse(self, found: str) -> InputError:
@@ -75,7 +75,7 @@ class Cut(Step):
             )
 
     def apply(self, rows: Rows) -> Rows:
-        """Set the values to missing, or remove the rows."""
+        """Return the rows with the specified values set to missing, or without the specified rows."""
         hit = np.zeros(len(rows.time), dtype=np.bool_)
         for t in self.times:
             hit |= self._rows(t, rows)
@@ -171,7 +171,7 @@ class Rezero(Step):
             raise self._refuse('specify the probe and the time: channels = ["z_um"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
-        """Offset the values."""
+        """Return the rows with the values of the probe offset."""
         begin = rows.seconds(self.at, self.name)
         end = np.inf if self.until is None else rows.seconds(self.until, self.name)
         moved = (rows.time >= begin - _SAME) & (rows.time < end - _SAME)
@@ -214,7 +214,7 @@ class Swap(Step):
             raise self._refuse('specify the two channels and the time: channels = ["t1_C", "t2_C"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
-        """Exchange the values."""
+        """Return the rows with the values of the two channels exchanged."""
         a, b = rows.columns(self.channels, self.name)
         kinds = {c.name: c.quantity for c in rows.channels}
         if kinds[a] != kinds[b]:

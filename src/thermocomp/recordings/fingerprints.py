@@ -44,7 +44,7 @@ class _Scale(NamedTuple):
 
 
 class _Windows(NamedTuple):
-    """All runs of one channel at one stride, by first row."""
+    """All runs of differences of one channel at one row spacing (stride), by first row."""
 
     mark: Marks  #: hash; 0 where a value is missing
     telling: BoolArray  #: the run has enough information to be recognised
@@ -161,7 +161,7 @@ def hash_runs(x: FloatArray, step: float, stride: int, length: int = LENGTH) -> 
 
 
 def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Windows:
-    """Return the runs of a channel, with their information, movement and rounding margin."""
+    """Return the runs of a channel: whether each identifies its rows, its movement and its rounding margin."""
     ratio = np.nan_to_num(_rounded(x, scale.step, stride))
     moves = np.rint(ratio)
     n = len(moves) - (LENGTH - 1) * stride
@@ -182,7 +182,7 @@ def _windows(x: FloatArray, scale: _Scale, stride: int, rows: TargetRows) -> _Wi
 
 
 def _seldom(mark: Marks, halves: Marks, stride: int) -> BoolArray:
-    """Return the runs whose halves have few distinct continuations and do not recur soon.
+    """Return the runs that can identify rows: their halves have few distinct continuations, and they do not recur soon.
 
     Repetitions of a complete run do not exclude it: copies of a recording repeat it as well.
     """

@@ -19,7 +19,7 @@ from thermocomp.recordings.headings import Meaning, understand
 def parts_of(
     table: pd.DataFrame, *, time: Any, units: Mapping[str, str], cycles: str | Sequence[object] | None, name: str
 ) -> dict[str, Any]:
-    """Return the `Recording` arguments for a table."""
+    """Return the arguments of `Recording` for a table in memory."""
     columns = [str(c) for c in table.columns]
     twice = sorted({c for c in columns if columns.count(c) > 1})
     if twice:

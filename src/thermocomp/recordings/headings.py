@@ -101,7 +101,7 @@ def understand(heading: str) -> Meaning | None:
 
 
 def _kind_of_length(base: str, symbol: str) -> str:
-    """Return the quantity of a length according to its name."""
+    """Return the quantity of a column with a unit of length: a displacement, a position and so on, by its name."""
     words = re.split(r"[\s_.-]+", base.casefold())
     if any(w in ("pos", "position") for w in words) or (symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)):
         return "position"
@@ -163,7 +163,7 @@ def is_foreign_unit(symbol: str) -> bool:
 
 
 def is_time_name(heading: str) -> bool:
-    """Return whether a heading without its unit names a time."""
+    """Return whether a heading, without its unit, denotes a time."""
     return plain_name(heading) in _TIMES
 
 

@@ -79,7 +79,7 @@ def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, 
 
 
 def _tries(prints: Prints, interval: float) -> Iterator[tuple[Runs, int]]:
-    """Yield runs and the strides at which they may match: the same number of rows, and the same time."""
+    """Yield runs and the strides at which they may match: for equal numbers of rows, and for equal durations."""
     rate = prints.interval / interval
     for run in prints.runs:
         yield run, run.stride

@@ -57,7 +57,7 @@ class ProfileOptions:
 
     @property
     def about(self) -> tuple[str, Literal["um", "urad"]]:
-        """Axis and unit of the profiles."""
+        """Axis along which the profiles were measured, and unit of their values."""
         component = BY_CODE.get(self.target)
         axis = self.axis or (component.depends_on if component else "") or ""
         unit = self.unit or (component.unit if component else "")
@@ -90,7 +90,7 @@ class Slopes:
     remainder : float
         Residual of all states except the reference, RMS per degree of freedom [unit]; NaN if there is none.
     shared : float
-        Fraction of the error variance that is common to all states: noise of the reference.
+        Fraction of the error variance that is common to all states: noise of the reference profile.
     """
 
     powers: tuple[int, ...]
@@ -218,14 +218,14 @@ class Profiles:
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of states, points and values."""
+        """SHA-256 of the thermal states, the points and the values."""
         digest = hashlib.sha256(self.states.fingerprint.encode())
         for array in (self.points, self.values):
             digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
         return digest.hexdigest()
 
     def reference_rows(self, reference: int | Sequence[int] = 0) -> IntArray:
-        """Return the states that are regarded as cold."""
+        """Return the rows of the thermal states that count as cold."""
         rows = np.atleast_1d(np.asarray(reference, dtype=np.intp))
         n = len(self)
         wrong = [int(k) for k in rows if not -n <= k < n]

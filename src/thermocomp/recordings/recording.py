@@ -51,8 +51,8 @@ class Recording:
     changed : tuple of str
         Notes on changes of the values by a mapping.
     compensation : {'', 'off', 'known', 'unknown'}
-        Whether a correction was in force at the machine, and known; empty: not specified. See
-        `thermocomp.recordings.compensated`.
+        ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
+        have been; empty: not specified. See `thermocomp.recordings.compensated`.
 
     Examples
     --------
@@ -194,7 +194,7 @@ class Recording:
         raise InputError(f"{PurePath(self.source).name or self.name}: no channel is named {name!r}; {hint}")
 
     def has(self, name: str) -> bool:
-        """Return whether `channel` finds a channel of this name."""
+        """Return whether the recording has a channel of this name, which may be its heading in the file."""
         try:
             self.channel(name)
         except InputError:
@@ -206,7 +206,7 @@ class Recording:
         return self.table[[c.name for c in channels]].to_numpy(dtype=np.float64)
 
     def with_cycles(self, cycles: Sequence[Cycle]) -> "Recording":
-        """Return the same recording with other thermal cycles."""
+        """Return the recording with a different division into thermal cycles."""
         return replace(self, cycles=tuple(cycles))
 
     @cached_property

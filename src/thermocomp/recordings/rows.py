@@ -71,7 +71,7 @@ class Rows:
     compensation: str = ""
 
     def kept(self, rows: IntArray) -> "Rows":
-        """Return some of the rows."""
+        """Return only the rows with the given indices."""
         numbers = rows.tolist()
         return replace(
             self,
@@ -83,7 +83,7 @@ class Rows:
         )
 
     def noted(self, *changes: str) -> "Rows":
-        """Return the rows with additional notes on changes."""
+        """Return the rows with further notes on changes of their values."""
         return replace(self, changed=(*self.changed, *changes))
 
     def seconds(self, at: Instant, owner: str) -> float:
@@ -105,7 +105,7 @@ class Rows:
             ) from e
 
     def columns(self, names: Sequence[str], owner: str) -> list[str]:
-        """Return the names of existing channels."""
+        """Return the names of the given channels, or raise an error if one does not exist."""
         known = [str(c) for c in self.table.columns]
         for name in names:
             if name not in known:

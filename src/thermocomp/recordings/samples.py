@@ -81,12 +81,12 @@ class Samples:
 
     @property
     def valid(self) -> BoolArray:
-        """Rows in which every input is a finite number."""
+        """Mask of the rows in which every input is a finite number."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     @property
     def rezeroed(self) -> BoolArray:
-        """Inputs relative to the start of their test."""
+        """Mask of the inputs that are relative to the start of their test."""
         return np.array([self.rezero and c.quantity == "temperature" for c in self.inputs], dtype=np.bool_)
 
     def reference(self) -> FloatArray:
@@ -117,7 +117,7 @@ class Samples:
 
     @property
     def stands(self) -> BoolArray:
-        """Rows in which the spindle is known to be stopped."""
+        """Mask of the rows in which the spindle is known to be stopped."""
         return np.zeros(len(self), dtype=np.bool_) if self.resting is None else self.resting
 
     def anew(self, test: int) -> int | None:
@@ -196,7 +196,7 @@ class Samples:
         return Learned(float(y[known].mean()), last, float(np.median(noise)), float(np.abs(y[known]).max()))
 
     def take(self, rows: BoolArray | IntArray) -> "Samples":
-        """Return a selection of rows, in their order."""
+        """Return the samples with a selection of their rows, in the same order."""
         return replace(
             self,
             values=self.values[rows],

@@ -84,7 +84,7 @@ class Start:
             raise InputError(f"a gap of {self.gap:g} s between two files: must be more than 0 s")
 
     def content(self, name: str) -> dict[str, object]:
-        """Return the initial state as data for programs."""
+        """Return the initial thermal state as a dict of plain values, for JSON."""
         return {
             "recording": name,
             "start": self.word,
@@ -171,7 +171,7 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
 
 
 def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
-    """Return the level of a channel at its start or at its end."""
+    """Return the value of a channel at its start (mean over its first rows) or at its end (last row)."""
     values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
     there = np.flatnonzero(np.isfinite(values))
     if not there.size:

@@ -1,4 +1,4 @@
-"""Tilts: angles from two probes at a distance along the test bar."""
+"""Tilts: angles from the readings of two probes at a known distance along the test bar."""
 
 from collections.abc import Sequence
 from dataclasses import replace

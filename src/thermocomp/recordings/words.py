@@ -8,12 +8,12 @@ _VOCABULARY = tomllib.loads(Path(__file__).with_name("vocabulary.toml").read_tex
 
 
 def read_words(key: str) -> tuple[str, ...]:
-    """Return the words of an entry of the vocabulary, in its order."""
+    """Return the words of an entry of ``vocabulary.toml``, in the order of the file."""
     return _split(_VOCABULARY[key])
 
 
 def read_word_groups(key: str) -> tuple[tuple[str, ...], ...]:
-    """Return the groups of words of an entry of the vocabulary, in its order."""
+    """Return the groups of words of an entry of ``vocabulary.toml``, in the order of the file."""
     return tuple(map(_split, _VOCABULARY[key]))
 
 

@@ -21,7 +21,7 @@ from thermocomp.report.summary import summarise
 
 
 def render(judged: Judged, recordings: Sequence[Recording]) -> str:
-    """Return the page."""
+    """Return the page about judged models as self-contained HTML."""
     nothing = Collinearity((), math.nan, ())
     seen = Comparison(Judging("all cycles", ()), judged.assessments, nothing, starts=judged.starts)
     overall = judged.overall()

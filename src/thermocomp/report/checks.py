@@ -25,7 +25,7 @@ _NAMED = 14
 
 
 def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]]) -> str:
-    """Return the page."""
+    """Return the page about the findings as self-contained HTML."""
     return page(
         "check.html",
         recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
@@ -115,7 +115,7 @@ def _limits(
 
 
 def _first(f: Finding) -> int | None:
-    """Return the row at which the number of a finding is shown."""
+    """Return the row of the recording at which the number of a finding is drawn."""
     return int(f.rows[0]) if f.rows is not None and f.rows.size else f.row
 
 

@@ -1,4 +1,4 @@
-"""Contributions to the output of a paced model: a figure and a table for the page."""
+"""Contributions of the inputs to the output of a `PacedDynamic` model: a figure and a table for the page."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ MOST = 6
 
 
 class Answer(NamedTuple):
-    """Contributions to the output of a model."""
+    """Figure and table of the contributions of the inputs to the output of a model."""
 
     figure: Drawn
     table: Layout
@@ -27,7 +27,7 @@ class Answer(NamedTuple):
 
 
 def explain(model: PacedDynamic, samples: Samples) -> Answer:
-    """Return the contributions to the output of a model in some recordings."""
+    """Return the contributions of the inputs to the output of a model over recordings."""
     return Answer(_draw(model, samples), _table(model, usual_step(samples.dt())), _lags(model))
 
 

@@ -222,7 +222,7 @@ def _cost_table(title: str, unit: str, costs: Sequence[Cost]) -> Layout:
 
 
 def _when(seconds: float, recording: Recording) -> str:
-    """Return a time, with date and clock time if known."""
+    """Return a time of a recording as text, with date and time of day if known."""
     if not recording.start:
         return f"{seconds / 3600:.2f} h"
     clock = datetime.fromisoformat(recording.start) + timedelta(seconds=seconds - float(recording.time[0]))

@@ -217,7 +217,7 @@ def shade_cycles(ax: Axes, recording: Recording) -> None:
 
 
 def thin_points(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
-    """Return about `points` points at most, including the extremes of each interval."""
+    """Return at most about `points` points, including the extremes of each interval."""
     stretch = len(x) // (points // 2)
     if stretch < 2 or not np.isfinite(y).all():
         return x, y

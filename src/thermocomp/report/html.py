@@ -80,7 +80,7 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
 
 
 def page(template: str, **content: Any) -> str:
-    """Return a page rendered from a template, with the version."""
+    """Return an HTML page rendered from a template, with the version of thermocomp."""
     return environment().get_template(template).render(version=__version__, **content)
 
 

@@ -28,7 +28,7 @@ class Toned(str):
 
 
 def verdict(word: str) -> Toned:
-    """Return a verdict in its tone."""
+    """Return a verdict as text, highlighted as good, doubtful or bad."""
     return Toned(word, {"accepted": "good", "unproven": "doubtful"}.get(word.partition(" ")[0], "bad"))
 
 
@@ -94,7 +94,7 @@ class Layout:
     sections: frozenset[int] = frozenset()
 
     def tone(self, row: int) -> str:
-        """Return the highlighting of a row; empty if none."""
+        """Return the name of the highlighting of a row; empty if it has none."""
         return (self.tones or {}).get(row, "")
 
 
@@ -109,7 +109,7 @@ def _cell(place: int, row: Sequence[Cell]) -> str:
 
 
 def in_um(value: float | None) -> str:
-    """Return a number as shown on pages."""
+    """Return a number of um as shown on pages: with hundredths below 100 um."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{round(value, 2) + 0.0:.2f}" if abs(value) < 100 else f"{value:.0f}"  # avoids -0.00

@@ -1,4 +1,4 @@
-"""Figure of a plan: the gap filled by the next test, the expected benefit of each test, and the learning curve."""
+"""Figure of possible next tests: the gap in the data that each fills, its expected benefit, and the learning curve."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ _STAR: dict[str, Any] = {"marker": "*", "ms": 12, "ls": "", "color": RESIDUAL, "
 
 
 def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
-    """Draw the recorded data with the next test in its gap; below it all tests, and the learning curve if any."""
+    """Draw the recorded data, and the next test in the gap that it fills; below, all tests and any learning curve."""
     with drawing("plan"):
         below = 1.4 + 0.22 * len(plan.candidates)
         figure = Figure(figsize=(9.6, 3.0 + below), layout="constrained")

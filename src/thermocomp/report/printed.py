@@ -1,4 +1,4 @@
-"""Terminal output of a result: lines and tables in order."""
+"""Terminal output of results, as a sequence of lines and tables."""
 
 from collections.abc import Iterator, Sequence
 
@@ -25,7 +25,7 @@ BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
 
 def comparison(found: Comparison) -> Iterator[Item]:
-    """Yield the output of a comparison of methods on unseen blocks."""
+    """Yield the lines and tables about a comparison of methods on unseen blocks."""
     yield from _starts(found.starts)
     yield PrintedLine(f"Judged on: {found.judging.name}")
     yield _assessment_table(found.assessments)
@@ -51,7 +51,7 @@ def comparison(found: Comparison) -> Iterator[Item]:
 
 
 def choices(found: Sequence[Choice]) -> Iterator[Item]:
-    """Yield the output of sensor selections."""
+    """Yield the lines and tables about sensor selections."""
     for c in found:
         for t in c.tables:
             yield from _titled(f"{c.target}: {t.title}", t)
@@ -61,7 +61,7 @@ def choices(found: Sequence[Choice]) -> Iterator[Item]:
 
 
 def fit(fitted: Fitted) -> Iterator[Item]:
-    """Yield the output of fitted models."""
+    """Yield the lines and tables about fitted models."""
     overall = fitted.comparison.overall()
     models = [records.model(m, r2, a) for m, r2, a in zip(fitted.models, fitted.r_squared, overall, strict=True)]
     yield from _starts(fitted.comparison.starts)
@@ -83,7 +83,7 @@ def fit(fitted: Fitted) -> Iterator[Item]:
 
 
 def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
-    """Yield the output of models judged on recordings."""
+    """Yield the lines and tables about models judged on recordings."""
     logs = find_faults(judged, recordings)
     yield from _starts(judged.starts)
     for line in describe_faults(logs, recordings):

@@ -15,7 +15,7 @@ class Shown(NamedTuple):
 
 
 class Section(NamedTuple):
-    """Content below a heading: a text is a paragraph."""
+    """A section of a page: heading, and parts in order, of which a text is a paragraph."""
 
     title: str
     parts: Sequence[str | Layout | Shown]

@@ -1,4 +1,4 @@
-"""A comparison as plain numbers and text, for the template."""
+"""Content of the report of a comparison, as plain numbers and text for the template."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -57,7 +57,7 @@ def summarise(
 
 
 def verdict(comparison: Comparison) -> str:
-    """Return the verdict in one sentence."""
+    """Return the verdict of a comparison in one sentence."""
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     best = {t: comparison.best(t) for t in targets}
     usable = {t: a for t, a in best.items() if a is not None}

@@ -1,7 +1,7 @@
-"""Adaptation of a model by probings: estimated model error, and its decay over time.
+"""Adaptation of a model by probings (measurements of the tool point): estimated model error, and its decay.
 
 A Kalman filter estimates the components of the model error: an offset with the size of the error on left-out cycles,
-and, for a model that is the average of many structures, a coefficient for each principal direction of their
+and, for a model that is the average of many regressions, a coefficient for each principal direction of their
 differences. A probing measures the sum of these. The offset decays with a time constant of hours, since it represents
 the present state of the machine; the coefficients represent what the training left undetermined and decay over days.
 Without a probing, the output of the model is unchanged.
@@ -19,16 +19,17 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: decay time constants of the offset and of the structure coefficients [s]
+#: decay time constants of the offset and of the coefficients of the directions [s]
 OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
-#: error that neither the offset nor the structures explain, as a share of the error on left-out cycles
+#: error that neither the offset nor the directions explain, as a share of the error on left-out cycles
 UNEXPLAINED = 0.2
 #: beyond this many standard deviations from the expected value, the weight of an unconfirmed probing decreases with the
-#: distance; of the first one for hours, earlier and to nothing at `IMPLAUSIBLE` (a redescending influence as of Hampel)
+#: distance; if there was none in the preceding hours, it decreases from a smaller distance, to zero at `IMPLAUSIBLE`
+#: (Hampel's redescending influence function)
 SUSPECT, SUSPECT_FIRST = 2.5, 2.0
 #: beyond this many standard deviations from the expected value, a probing is refused
 IMPLAUSIBLE = 4.0
-#: errors in most cycles and days are smaller than the overall root mean square: lower bound of their share of it
+#: lower bound of the typical error as a share of the overall RMS: errors in most cycles and days are smaller
 LEAST_USUAL = 0.5
 #: number of probings over which the size of the present day's errors is averaged
 MEMORY = 5.0
@@ -59,7 +60,7 @@ class Probing(NamedTuple):
 
     @property
     def identity(self) -> tuple[str, ...]:
-        """Keys of the probing, or its numbers if it has none."""
+        """Keys that identify the probing; if it has none, its values."""
         return self.keys or (f"{self.deviation} um at {self.position} mm, give or take {self.repeatability} um",)
 
 
@@ -227,5 +228,5 @@ def take(
 
 
 def _beside(directions: FloatArray, last: float) -> FloatArray:
-    """Return the directions with the weight of the offset appended."""
+    """Return the values of the directions, followed by a value for the offset."""
     return np.concatenate([directions, np.full((*directions.shape[:-1], 1), last)], axis=-1)

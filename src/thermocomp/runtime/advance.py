@@ -14,7 +14,7 @@ from thermocomp.runtime.group import Group
 
 
 class Advanced(NamedTuple):
-    """Models after a reading."""
+    """States and outputs of all models after a reading."""
 
     states: tuple[State, ...]
     gathered: tuple[Gathered, ...]  #: readings averaged for a zero that is not yet known

@@ -167,7 +167,7 @@ def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, Fl
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
-    """Apply the gate of the compensator to all readings."""
+    """Return which readings pass the gate of the compensator, the zero, and the rows averaged for it."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
     passed, why, known, window = complete.copy(), "", 0, list[int]()
     if np.isnan(zero).any():  # the first readings that pass determine the zero
@@ -200,7 +200,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
 def _counted(
     deviation: FloatArray, model: ErrorModel, time: FloatArray, used: BoolArray, stands: BoolArray, anew: int
 ) -> tuple[FloatArray, int]:
-    """Return the deviations relative to the re-zero, and the row from which the correction moves again."""
+    """Return the deviations relative to the new zero, and the row from which the correction moves again."""
     own = anew + np.flatnonzero(used[anew:])
     count, known = first_rows(model.zeroing, time[own], stands[own])
     shift = float(deviation[own[:count]].mean()) if count else 0.0

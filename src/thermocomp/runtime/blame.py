@@ -13,7 +13,8 @@ BoolArray = NDArray[np.bool_]
 
 #: time constant of the low-passed difference of reading and prediction [s]
 USUAL = 1800.0
-#: a swap is excluded once it has increased the mean square residual by this much, in units of the unseen errors
+#: a swap is excluded once it has increased the mean square residual by this much, relative to the squared errors on
+#: unseen cycles
 AGAINST = 0.1
 
 
@@ -21,8 +22,8 @@ class Blamed(NamedTuple):
     """The most likely failure of one kind, per run."""
 
     sensors: BoolArray  #: (..., n_sensors), sensors that would have failed
-    rest: FloatArray  #: (...,), sum of squares of the residuals, in units of the unseen errors; inf: no failure
-    worst: FloatArray  #: (...,), largest residual, in units of the limits
+    rest: FloatArray  #: (...,), sum of squared residuals, each relative to its error on unseen cycles; inf: no failure
+    worst: FloatArray  #: (...,), largest residual, relative to its limit
 
 
 def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:

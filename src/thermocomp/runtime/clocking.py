@@ -15,7 +15,7 @@ from thermocomp.runtime.state import CompensatorState, silence
 
 
 class Instant(NamedTuple):
-    """Time of a reading."""
+    """Time of a reading on the continuous time scale of the state."""
 
     time: float  #: on the time scale of the state [s]
     origin: float  #: new origin of the state [s]

@@ -83,7 +83,7 @@ class Compensator:
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
-        """Models that are stepped together."""
+        """Groups of models that are evaluated together in each step."""
         return Group.of(self.models)
 
     @cached_property
@@ -282,7 +282,7 @@ class Compensator:
         failed: Mapping[str, str],
         travel: float,
     ) -> Driven:
-        """Return what the stepped models change, target by target.
+        """Return the changes by one step of the models, target by target.
 
         Parameters
         ----------

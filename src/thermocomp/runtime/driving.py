@@ -19,7 +19,7 @@ ACTIVE = Status("active")
 
 @dataclass(kw_only=True)
 class Driven:
-    """What one reading changes, by target; see `CompensatorState` and `Compensated`."""
+    """Changes by one reading, by target; see `CompensatorState` and `Compensated`."""
 
     corrections: dict[str, Correction]
     learned: dict[str, Adaptation]
@@ -35,7 +35,7 @@ class Driven:
 
     @classmethod
     def begin(cls, state: CompensatorState, probed: Iterable[str]) -> "Driven":
-        """Return what is known before the models are evaluated."""
+        """Return the values before the models are evaluated: those of the previous state."""
         return cls(
             corrections=dict(state.corrections),
             learned=dict(state.learned),

@@ -44,7 +44,7 @@ class Group:
         return tuple(Group(models, members) for members in alike.values())
 
     def share(self, states: Sequence[State]) -> list[State]:
-        """Return states in which equal parts are shared objects."""
+        """Return the states of the models, with equal references and memories stored only once."""
         lead = states[0]
         same = all(_equal(s.reference, lead.reference) and _equal(s.memory, lead.memory) for s in states)
         if not same:
@@ -83,7 +83,7 @@ class Group:
 
 
 def _key(model: ErrorModel) -> object:
-    """Return what models have in common that can be evaluated jointly."""
+    """Return the properties that models must have in common to be evaluated jointly."""
     speeds = None if model.band is None else model.band.speeds
     return model.inputs, model.support, model.zeroing, model.remembered, speeds
 
@@ -103,7 +103,7 @@ class _Joint:
         self._stopped = np.array([np.nan if b is None else b.stopped for b in bands])
 
     def step(self, state: State, values: FloatArray, dt: float) -> tuple[list[State], list[float], list[float]]:
-        """Process a reading: see `Group.step`."""
+        """Process a reading with all models of the group: see `Group.step`."""
         begins, lead = state.memory is None, self._lead
         reference = lead.settle(state.reference, values) if begins else state.reference
         change, outside = lead.clip(values - reference)

@@ -25,7 +25,7 @@ class DeviationLine(NamedTuple):
 
 
 class Said(NamedTuple):
-    """Output of a line for one reading."""
+    """Output for one target or axis and one reading."""
 
     deviation: Deviation  #: including adaptation by earlier probings
     half_width: float  #: of its uncertainty band [um]; nan without a band
@@ -64,7 +64,7 @@ def evaluate(
     zero: Deviation,
     magnitude: float,
 ) -> Said:
-    """Return the output of a line for a reading.
+    """Return the output of a target or an axis for one reading.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A watch applied to the values of a source: values by channel in, values by channel out."""
+"""A watch (sensor monitoring) applied to the values of a source: values by channel in, values by channel out."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
 
 
 class Lookout:
-    """A watch, with the positions of its inputs in a reading."""
+    """A watch, with the indices of its inputs among the values of a reading."""
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch

@@ -18,7 +18,7 @@ FORGOTTEN = 24 * 3600.0
 
 
 class Status(NamedTuple):
-    """Status of a target or axis: a word of `Word`, and the reason."""
+    """Status of a target or axis, such as ``holding``, and the reason."""
 
     word: Word
     reason: str = ""

@@ -147,9 +147,9 @@ def look(
 
 
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
-    """Return the first readings; an impossible one gets the median offset of the others from the zero of the training.
+    """Return the first readings; an implausible one gets the others' median offset from the zero of the training.
 
-    Possible readings are those that the gate of the compensator accepts at a start.
+    Plausible readings are those that the gate of the compensator accepts at a start.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
@@ -199,13 +199,13 @@ def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArra
 
 
 def _stand_in(state: WatchState, time: float) -> FloatArray:
-    """Return the substitute value of a sensor, minus the reference."""
+    """Return the substitute value of each sensor, minus its reference."""
     gone = np.fmax(time - state.since, 0.0)  # 0 if not failed
     return state.predicted + state.bridge * np.exp(-gone / FADE)
 
 
 def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
-    """Check all sensors; `x` is nan where a temperature is missing."""
+    """Check all sensors and return the next state; `x` is nan where a temperature is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
     s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
@@ -236,7 +236,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
 
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
-    """Return changes with speeds clipped, so that one reading of 65,535 1/min does not flood the memory with heat."""
+    """Return changes with speeds clipped, so that one reading of 65,535 1/min does not add much heat."""
     most = HEATS * watch.top_speed
     calm = change.copy()
     calm[..., watch.speeds] = np.clip(calm[..., watch.speeds], -most, most)

@@ -26,7 +26,7 @@ _FRICTION = ("front_bearing", "rear_bearing", "coolant")
 
 @dataclass(frozen=True, eq=False)
 class CentreState:
-    """State of the machine.
+    """Thermal state of the machining centre.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class MachiningCentre:
     def _advance(
         self, now: FloatArray, chilling: bool, drive: FeedDrive, air: FloatArray, dt: float, fields: FloatArray
     ) -> bool:
-        """Fill in the fields after each step with one drive; return whether the chiller runs after the last step."""
+        """Write the states after each step of one drive command to `fields`; return whether the chiller runs."""
         self._check(drive)
         heat = self.heat
         operators = self.model.operators(self._theta(drive), dt, self._watched)
@@ -164,7 +164,7 @@ class MachiningCentre:
 
     @property
     def _watched(self) -> tuple[str, ...]:
-        """Places evaluated after every step; those of `_WATCHED` first."""
+        """Places whose temperatures are evaluated after every step; those of `_WATCHED` first."""
         return _WATCHED
 
     def _friction(self, drive: FeedDrive, seen: list[float]) -> tuple[float, float]:
@@ -174,7 +174,7 @@ class MachiningCentre:
         return self.heat.front.heat(ratio, front, shaft - seat), self.heat.rear.heat(ratio, rear, 0.0)
 
     def _correction(self, _operators: Operators, _drive: FeedDrive) -> Correction | None:
-        """Return a change of the state after a step, in addition to the reduced model; None here."""
+        """Return a change of the state after each step, in addition to the reduced model; None: there is none."""
         return None
 
     def _shaft(self, place: Mapping[str, FloatArray], ratio: FloatArray) -> FloatArray:

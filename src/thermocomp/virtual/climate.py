@@ -58,7 +58,7 @@ class Climate:
 
     @property
     def middle(self) -> Air:
-        """Mean state of the air."""
+        """State of the air averaged over time: mean temperature and stratification."""
         return Air(self.mean, self.layers)
 
     def init(self, rng: np.random.Generator) -> FloatArray:
@@ -69,7 +69,7 @@ class Climate:
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of several equal steps.
+        """Return the state of the air at the end of each of several equal steps.
 
         Parameters
         ----------

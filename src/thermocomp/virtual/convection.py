@@ -23,7 +23,7 @@ GRAVITY, STEFAN_BOLTZMANN, KELVIN = 9.81, 5.670e-8, 273.15
 
 @dataclass(frozen=True)
 class Face:
-    """A surface in air.
+    """A surface cooled by air.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Faces:
         self._lying, self._wind, self._films_turning = columns[5:]
 
     def linear(self, rotation: float) -> FloatArray:
-        """Return the conductances of the linear model [W/K]."""
+        """Return the conductances of the surfaces in the linear model [W/K]."""
         result: FloatArray = self._area * (self._films + self._films_turning * rotation)
         return result
 

@@ -41,7 +41,7 @@ class Exchange:
     def of(
         cls, model: ReducedModel, operators: Operators, watched: Sequence[str], paths: Sequence[tuple[str, str | None]]
     ) -> "Exchange":
-        """Prepare heat paths.
+        """Return the operators of the heat exchange along paths.
 
         Parameters
         ----------

@@ -24,7 +24,7 @@ S = TypeVar("S")
 
 #: longest interval between two outputs of the machine model [s]
 LONGEST_TICK = 20.0
-#: number of ticks processed at once, which limits the memory between machine and recording
+#: number of time steps computed at once, which limits the memory
 BLOCK = 4096
 #: quantities recorded relative to the first row
 MOVEMENTS = ("displacement", "angle")

@@ -31,7 +31,7 @@ class Wave:
     Parameters
     ----------
     slope, curvature, cubic : float
-        Coefficients of u, u^2, u^3; u runs from about -1 to 1 over the travel, with 300 mm as unit [um, urad].
+        Coefficients of u, u^2, u^3 [um, urad]; u is the distance from the middle of the travel divided by 300 mm.
     amplitude : float
         Amplitude of the sine wave [um, urad].
     length : float

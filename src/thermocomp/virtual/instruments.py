@@ -150,7 +150,7 @@ class Touch:
                     raise SettingError(f"is beyond the travel from 0 to {TRAVEL[axis]:g} mm", ("points", label, k))
 
     def instruments(self, *, perfect: bool) -> list[Instrument]:
-        """Return an instrument for each axis of each point."""
+        """Return one instrument per axis and probed point."""
         return [
             Instrument(
                 Sensor(

@@ -108,7 +108,7 @@ class Kit:
     top_speed: float = 0.0
 
     def place(self, name: str, *, perfect: bool) -> str:
-        """Return the description of a temperature place."""
+        """Return the description of a place where a temperature sensor can be mounted."""
         if name in self.inner and not perfect:
             raise SettingError(
                 f"{name!r} is on a rotating part: its temperature can only be calculated, with perfect = true"
@@ -188,7 +188,7 @@ PLACES: dict[str, str] = {
 
 
 def _profile(code: str) -> tuple[str, ...]:
-    """Return the probes of a component at all stations of its axis."""
+    """Return the names of the probes that measure a component at all stations of its axis."""
     return tuple(f"{code}_{p}" for p in STATIONS[code[2].lower()])
 
 

@@ -117,7 +117,7 @@ class VirtualMachine(Protocol[S]):
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Names of the observed deviations."""
+        """Names of the deviations that the machine model outputs."""
         ...
 
     def init(self, air: Air) -> S:

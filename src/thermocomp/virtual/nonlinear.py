@@ -1,9 +1,9 @@
 """Virtual machines with nonlinear joints, bearings and surfaces, in addition to the linear ones.
 
-Differences: films that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open and close
-(`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`), and expansion
-coefficients that increase with temperature. Each value has a source or is marked as an engineering value; none was
-tuned to the results of a method.
+Differences: film coefficients that depend on temperatures and speed (`thermocomp.virtual.convection`), joints that open
+and close (`thermocomp.virtual.fits`), preload and friction of the bearings (`thermocomp.virtual.preload`), and
+expansion coefficients that increase with temperature. Each value has a source or is marked as an engineering value;
+none was tuned to the results of a method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ EXPANSION_GROWS = 0.8e-8 / 1.216e-5
 PAINT, BARE = 0.9, 0.25
 
 #: HSK-A63: shank of 48.007 to 48.011 mm at the gauge line (ISO 12164, in Y. Ito, Modular Design for Machine Tools, fig.
-#: 9-21) in a socket of 48 mm: interference of 4.5 um in radius; hollow shank and nose as in the finite elements
+#: 9-21) in a socket of 48 mm: interference of 4.5 um in radius; hollow shank and nose as in the finite-element model
 TAPER = Fit(radius=21.5, bore=10.0, outside=44.0, length=32.0, squeeze=4.5, linear=4000.0)
 #: Hydraulic chuck, 20 mm carbide shank over 50 mm: pressure of 70 MPa (an engineering value: catalogues state some
 #: hundred N m, which agrees with 330 N m at a friction of 0.15); behind the sleeve the oil of the linear model
@@ -55,7 +55,7 @@ SEAT = Fit(radius=55.0, bore=45.0, outside=80.0, length=60.0, squeeze=-3.0, line
 FRONT = AngularContact(pitch=90.0, ball=12.7, balls=20, static=44e3, preload=600.0)
 REAR = AngularContact(pitch=77.5, ball=11.1, balls=19, static=33e3, preload=300.0, pair=1, sprung=True)
 
-#: Surfaces of the resting tool: areas and lengths from the finite elements
+#: Surfaces of the resting tool: areas and lengths from the finite-element model
 TOOL_FACES: Mapping[str, Face] = {
     "on_tool": Face(0.00723, 0.110, 9.0, BARE, curvature=5.5),
     "on_chuck": Face(0.01800, 0.090, 8.0, BARE, curvature=1.8),
@@ -80,7 +80,7 @@ IN_WORK_SPACE = ("spindle_rotating", "spindle_front")
 
 @dataclass(frozen=True, eq=False)
 class NonlinearTool(RestingTool):
-    """The resting tool with films, joints and expansion that depend on its temperatures.
+    """The resting tool with film coefficients, joints and expansion that depend on its temperatures.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class NonlinearTool(RestingTool):
 
 @dataclass(frozen=True, eq=False)
 class NonlinearCentre(MachiningCentre):
-    """The machining centre with films, joints, bearings and expansion that depend on temperatures and speed.
+    """The machining centre with films, joints, bearings and expansion that depend on temperature and speed.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ def station_name(axis: str, station: int) -> str:
 
 
 def _summed(*parts: tuple[float, Mapping[str, float]]) -> dict[str, float]:
-    """Return the weighted sum of sets of weights."""
+    """Return the sum of several sets of weights, each multiplied by a factor."""
     total: dict[str, float] = {}
     for factor, weights in parts:
         for name, w in weights.items():

@@ -1,7 +1,7 @@
 """Protocols as data: commands to a virtual machine, and recorded channels.
 
-Written protocols (`Experiment`, `PlannedTest`) may leave numbers and orders open, to be drawn at random from a seed;
-executed ones (`Programme`) are fixed.
+Written protocols (`Experiment`, `PlannedTest`) may leave numbers and sequences open, to be selected at random from a
+seed; executed ones (`Programme`) are fixed.
 """
 
 import math
@@ -34,7 +34,7 @@ MOST_ROWS, MOST_COPIES = 10_000_000, 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingSetup:
-    """Recorded channels of a test and their places.
+    """Settings of the recording of a test: its channels, places and sampling.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class PlannedTest(RecordingSetup, Stretch):
             )
 
     def programme(self, name: str, rng: np.random.Generator) -> Programme:
-        """Return a test that is ready to run, with all open values drawn at random."""
+        """Return a test that is ready to run, with all open values selected at random."""
         setup = {f.name: getattr(self, f.name) for f in fields(RecordingSetup)}
         return Programme(name=name, segments=tuple(self.draw(rng)), soak=tuple(self.soak.draw(rng)), **setup)
 
@@ -234,7 +234,7 @@ class Experiment:
         return tuple(found)
 
     def programmes(self, seed: int = 0) -> list[Programme]:
-        """Return the tests with all open values drawn at random, separately for each test."""
+        """Return the tests with all open values selected at random, separately for each test."""
         plans = [plan for plan in self.tests for _ in range(plan.copies)]
         return [
             plan.programme(name, np.random.default_rng(make_seed(seed, name, "lots")))

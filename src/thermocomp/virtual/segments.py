@@ -1,4 +1,4 @@
-"""Components of a test: segments, and the values drawn at random from a seed."""
+"""Components of a test: segments, and values selected at random from a seed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ class SteadySegment:
 
 @dataclass(frozen=True)
 class Lot:
-    """A number drawn at random with equal probabilities: either `one_of`, or `between` with `step`.
+    """A number selected at random with equal probabilities: either `one_of`, or `between` with `step`.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Lot:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """All values that can be drawn."""
+        """All values that can be selected at random."""
         if self.between is None or self.step is None:
             return self.one_of
         return tuple(self.between[0] + k * self.step for k in range(round(self._steps) + 1))
@@ -129,9 +129,9 @@ class Stretch:
     segments : tuple of Stretch
         Nested segments; none: this is a segment itself.
     repeat : int
-        Number of repetitions of its `segments`, or number of draws.
+        Number of repetitions of its `segments`, or number of random selections.
     order : {'given', 'shuffled', 'drawn'}
-        In sequence; all (`repeat` times each) in random order; or one drawn at random each time.
+        In sequence; all (`repeat` times each) in random order; or one selected at random each time.
     weight : float
         Relative probability where the outer order is ``drawn``.
     """
@@ -181,7 +181,7 @@ class Stretch:
             yield from s.leaves(given, (*path, "segments", k))
 
     def draw(self, rng: np.random.Generator, outer: Mapping[str, Any] | None = None) -> list[SteadySegment]:
-        """Return the segments, with all open values drawn at random."""
+        """Return the segments, with all open values selected at random."""
         given = self._given(outer or {})
         if not self.segments:
             return [_segment(given, rng)]

@@ -44,7 +44,7 @@ class Sensor:
 
 
 def apply_lags(lags: FloatArray, felt: FloatArray, before: FloatArray, true: FloatArray, dt: float) -> FloatArray:
-    """Return the values at sensors with a lag.
+    """Return the true values after the first-order lags of the sensors.
 
     Parameters
     ----------

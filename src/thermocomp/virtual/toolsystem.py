@@ -19,7 +19,7 @@ LOADS = ("heater", "tip")
 
 @dataclass(frozen=True, eq=False)
 class ToolState:
-    """State of the tool.
+    """Thermal state of a chuck with its tool.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class RestingTool:
     def _advance(
         self, now: FloatArray, drives: Sequence[FeedDrive], air: FloatArray, dt: float, fields: FloatArray
     ) -> None:
-        """Fill in the fields after each part of each step."""
+        """Write the states after each part of each step to `fields`."""
         parts = len(fields) // len(drives)
         operators = self.model.operators((), dt, ("surface",))
         surface = self.model.inputs.index("surface")

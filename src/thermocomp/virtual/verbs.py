@@ -1,4 +1,4 @@
-"""Recordings of the virtual machine, in Python."""
+"""Python functions that record experiments on the virtual machines."""
 
 from collections.abc import Callable
 from pathlib import Path

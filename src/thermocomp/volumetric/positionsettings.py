@@ -79,7 +79,7 @@ class PositionSettings:
     jobs: int = -1
 
     def left_out(self, recordings: int) -> "LeaveOne | None":
-        """Return the unit left out in turn; by default each recording if there are at least `MANY`."""
+        """Return what is left out in turn, cycles or recordings; by default recordings if there are at least `MANY`."""
         asked = (self.split is not None) + self.leave_one_cycle_out + self.leave_one_file_out
         if asked > 1:
             raise InputError("--split, --leave-one-cycle-out, --leave-one-file-out exclude each other: choose one")

@@ -1,4 +1,4 @@
-"""Errors along the axes and in the work volume, in Python."""
+"""Python functions for the errors along the axes and in the work volume."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ class Positioned:
 
     @property
     def models(self) -> tuple[PositionModel, ...]:
-        """Models, one per component."""
+        """Position models, one per fitted component."""
         return tuple(f.fit.model.taken(self.accept_unproven) for f in self.found)
 
     def to_dict(self) -> dict[str, Any]:
@@ -297,7 +297,7 @@ def _several(component: Sequence[str]) -> bool:
 
 
 def _read(paths: Sequence[Path], components: Sequence[str], s: PositionSettings) -> list[tuple[Profiles, ...]]:
-    """Read one component with any column names, or several from columns named after them."""
+    """Read the profile of one component from columns of any name, or of several from columns named after them."""
     given = mappings.read_mapping(s.mapping) if s.mapping is not None else None
     if _several(components):
         if s.columns or s.positions is not None or s.layout == "long":

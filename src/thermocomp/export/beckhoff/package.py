@@ -49,7 +49,7 @@ The CNC spreads a change over a number of cycles of its own; here a correction c
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to TwinCAT CNC, by name."""
     tables, own = gather(compensator), identifier(name)
     drives = find_drives(tables, axes or {})
     more = write_values(f"{own}_axis", "twincat", drives, TAKEN, 1.0)

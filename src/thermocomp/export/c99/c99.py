@@ -129,7 +129,7 @@ void {name}_step({name}_state *s, const tc_real value[{n}], double age, double d
 
 @dataclass(frozen=True)
 class Sources:
-    """A compensator in C.
+    """Source and header of a compensator in C99.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def identifier(name: str) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that cannot end a comment."""
+    """Return a text in which nothing ends a C comment."""
     for sign in ("*/", "/*", "??"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""The block's functions in C99."""
+"""Translation of the program of a compensator to C99 functions."""
 
 import math
 import re
@@ -20,12 +20,12 @@ TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bo
 
 
 def write_functions(tables: Tables, state: str) -> str:
-    """Return the functions that a block needs, `step` last."""
+    """Return the C functions that a compensator needs, `step` last."""
     return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
 
 
 class _Writer(Printer):
-    """Writer of one function."""
+    """Translator of one function of the program to C99."""
 
     operators: ClassVar[Mapping[Operator, str]] = {"and": "&&", "or": "||", "//": "/"}
 

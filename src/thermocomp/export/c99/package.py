@@ -74,14 +74,14 @@ controller must not compensate for temperature itself at the same time.
 """
 
 
-#: last digits by which the difference of two readings may be wrong
+#: largest error of the difference of two readings, in units of the last digit
 _DIGITS = 2.0
 #: largest error of single precision as a fraction of the correction; above it, single precision is rejected
 _COARSE = 1.0
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to C99, by name."""
     tables, said = gather(compensator), facts.lines(compensator)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)

@@ -1,4 +1,4 @@
-"""`thermocomp export`: a model file as code for another controller, with its verification."""
+"""`thermocomp export`: a model file as program code for a controller, with a test that verifies it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -75,7 +75,7 @@ are 0 it has gone, and the calls may go, too. Never clear the external offset by
 def write_fanuc(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last."""
+    """Return all files of the export to Fanuc controls by name, the page of instructions last."""
     marks = find_marks(reductions)
     if len(marks) > _ROOM:
         raise InputError(f"{len(marks)} temperatures, but the macro has room for {_ROOM}: choose fewer with --sensors")
@@ -118,7 +118,7 @@ def write_fanuc(
 
 
 def _axis(r: Reduced, place: dict[str, int], most: float, step: float) -> Iterator[str]:
-    """Yield the lines of an axis."""
+    """Yield the lines of the macro that correct one axis."""
     force, label = _FORCE[r.axis], 10 * (1 + "XYZ".index(r.axis))
     yield f"({_comment(r.model.target)})"
     yield f"(#{force}: CORRECTION OF {r.axis} IN FORCE IN MM. KEPT AT POWER-OFF)"

@@ -63,7 +63,7 @@ axis follows at 1 um/s), and set the datums again: a dimension that changes move
 def write_heidenhain(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last."""
+    """Return all files of the export to Heidenhain controls by name, the page of instructions last."""
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     marks = find_marks(reductions)
     most = min(math.floor(limits.magnitude), _WORD)  # in whole um
@@ -115,7 +115,7 @@ def find_marks(reductions: Sequence[Reduced]) -> dict[str, str]:
 
 
 def formula(r: Reduced, marks: dict[str, str], *, word: bool = False) -> str:
-    """Return a formula to be appended to a dimension; the correction is in um for a `word`."""
+    """Return a formula as text: in mm, to be appended to a dimension of the machine, or in um for a TNC 360 `word`."""
     sign, number = (-1, in_um) if word else (1, in_mm)
     text = _signed(number(sign * r.model.intercept)) if r.model.intercept else ""
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):

@@ -77,7 +77,7 @@ For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
 def write_klipper(
     reductions: Sequence[Reduced], limits: Limits, name: str, facts: Facts, *, figure: str = ""
 ) -> dict[str, bytes]:
-    """Return all files by name, the page of instructions last."""
+    """Return all files of the export to Klipper by name, the page of instructions last."""
     if len(reductions) > 1:
         raise InputError(
             f"Klipper has one [z_thermal_adjust], but there are {', '.join(r.model.target for r in reductions)}: name "

@@ -175,7 +175,7 @@ def name_component(name: str) -> str:
 
 
 def write_component(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[str, str]) -> str:
-    """Return the text of a component, for ``halcompile``."""
+    """Return the source text of a HAL component, for ``halcompile``."""
     pins, moves = list[str](), list[str]()
     for k, target in enumerate(tables.targets):
         a, at = letters[target].lower(), "0.0"

@@ -83,7 +83,7 @@ the line out of the INI. Never set `axis.L.eoffset-clear` or take `eoffset-enabl
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by name.
+    """Return all files of the export for LinuxCNC, by name.
 
     Parameters
     ----------

@@ -18,18 +18,18 @@ GAIN = 0.05
 DEAR = 2.0
 #: above this number of sets of a size, only supersets of the best smaller set are tried
 _MOST_SETS = 50_000
-#: regularisation for collinear columns, relative to columns scaled to 1
+#: regularization strength for collinear columns, relative to columns scaled to 1
 _LITTLE = 1e-12
 
 
 class LinearReduction(TermRegressor):
     """Least squares on the one to `max_sensors` inputs that best predict unseen cycles, with printable coefficients.
 
-    Every set is fitted without each thermal cycle in turn and tested on that cycle, complete and with each input lost:
-    a simple controller does not detect a lost input. Sets that are then worse than no model are passed over, unless
-    the RMS of the others exceeds `DEAR` times the best one. The smallest set that no larger one beats by `GAIN` is
-    fitted to all cycles, and its coefficients are rounded as in the controller's file: the judged model is the printed
-    one.
+    Every set is fitted with each thermal cycle left out in turn and tested on that cycle, complete and with each input
+    lost: a simple controller does not detect a lost input. Sets that are worse than no model with an input lost are
+    passed over, unless the RMS of the others exceeds `DEAR` times the best one. The smallest set that no larger one
+    beats by `GAIN` is fitted to all cycles, and its coefficients are rounded as in the controller's file: the judged
+    model is the printed one.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class LinearReduction(TermRegressor):
     unseen_ : float
         RMS over the left-out cycles [unit of y].
     chosen_by_ : str
-        Units left out for the selection.
+        Parts of the data left out in turn for the selection, as text.
     terms_, coef_, intercept_, r_squared_, adjusted_r_squared_, standard_error_, n_effective_, condition_
         See `thermocomp.models.linear.TermRegressor`; they refer to the coefficients before rounding.
 

@@ -31,7 +31,7 @@ class ReductionOptions:
     jobs: int = -1
 
     def named(self) -> dict[str, str]:
-        """Return the axes by target."""
+        """Return the axis letters given by the user, by target."""
         found = {}
         for text in self.axes or ():
             target, _, axis = text.rpartition("=")

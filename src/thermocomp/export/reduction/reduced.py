@@ -44,7 +44,7 @@ SHAPES = {
 
 
 class RemainingError(NamedTuple):
-    """Residual of a deviation [um]; nan if unknown."""
+    """Size of the error that remains after compensation [um]; nan if unknown."""
 
     rms: float
     largest: float
@@ -121,7 +121,7 @@ class Reduced:
         )
 
     def why_not(self, most_loss: float) -> str:
-        """Return the reason why it must not be exported; empty if it may be."""
+        """Return the reason why the reduced model must not be exported; empty if it may be."""
         found = self.model.honest_error
         if found is None:
             return "it was never judged on unseen cycles"

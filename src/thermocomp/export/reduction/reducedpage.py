@@ -58,7 +58,7 @@ def write_page(
     off: str,
     figure: str,
 ) -> str:
-    """Return the page of instructions."""
+    """Return the page of instructions for a reduced model."""
     ranges = "; ".join(
         ", ".join(f"{i.name} {i.low:+.1f} to {i.high:+.1f} degC from its zero" for i, _ in r.terms) for r in reductions
     )

@@ -55,7 +55,7 @@ default; at most 0.10 there) and MD32000 = 10000 mm/min, dv is 100 mm/min.
 def write_package(
     compensator: Compensator, name: str, facts: Facts, axes: Mapping[str, str] | None = None
 ) -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to SINUMERIK controls, by name."""
     tables, own = gather(compensator), identifier(name)
     drives = find_drives(tables, axes or {})
     more = write_values(f"{own}_sd", "scl", drives, TAKEN, -1.0)

@@ -85,7 +85,7 @@ _OBJECT = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
-    """Return all files by name."""
+    """Return all files of the export to structured text, by name."""
     return write_blocks(compensator, name, facts, dialect)
 
 
@@ -137,7 +137,7 @@ def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:
 
 
 def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
-    """Return name and text of a TwinCAT 3 file."""
+    """Return the name and the text of a TwinCAT 3 file for a block or type."""
     body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
     kind = "POU" if unit.end else "DUT"
     first, rest = unit.declaration.split("\n", 1)

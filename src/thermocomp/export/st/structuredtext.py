@@ -53,7 +53,7 @@ END_FOR;
 
 @dataclass(frozen=True)
 class SourceUnit:
-    """A block or a type.
+    """Source text of a block or a type.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class SourceUnit:
     end: str = ""
 
     def text(self, dialect: Dialect) -> str:
-        """Return the complete source text."""
+        """Return the complete source text of the block or type."""
         if not self.end:
             return self.declaration + "\n"
         begin = ["BEGIN"] if dialect == "scl" else []
@@ -77,7 +77,7 @@ class SourceUnit:
 
 
 def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
-    """Return a compensator in structured text, with every unit after those that it uses.
+    """Return a compensator in structured text, with every block or type after those that it uses.
 
     The code processes values as `Compensator.step` processes a reading.
     """
@@ -114,7 +114,7 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
 
 
 def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
-    """Return the function block."""
+    """Return the function block of the compensator."""
     mark, n = "#" if scl else "", len(tables.channels)
     outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
     kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
@@ -165,7 +165,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def comment(text: str) -> str:
-    """Return a text that cannot end a comment."""
+    """Return a text in which nothing ends a comment of structured text."""
     for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
     return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""The block's functions in structured text (IEC 61131-3), in the dialects of CODESYS, TwinCAT and Siemens SCL."""
+"""Functions of the block in structured text (IEC 61131-3), in the dialects of CODESYS, TwinCAT and Siemens SCL."""
 
 import re
 import textwrap
@@ -60,7 +60,7 @@ def write_functions(tables: Tables, name: str, dialect: Dialect) -> dict[str, tu
 
 
 class _Writer(Printer):
-    """Writer of one function."""
+    """Translator of one function of the program to structured text."""
 
     operators: ClassVar[Mapping[Operator, str]] = {
         "//": "/",
@@ -168,7 +168,7 @@ BAGS = {"s": "state", "w": "work", "t": "tables"}
 
 
 def quoted(name: str, scl: bool) -> str:
-    """Return the name of a block or of a type."""
+    """Return the name of a block or type, in quotation marks if the dialect requires them."""
     return f'"{name}"' if scl else name
 
 
@@ -179,18 +179,18 @@ def section(word: str, variables: Mapping[str, str]) -> str:
 
 
 def array(kind: Kind, size: int) -> str:
-    """Return the type of an array."""
+    """Return the declaration of an array type."""
     return f"ARRAY[0..{max(size, 1) - 1}] OF {TYPES[kind]}"
 
 
 def values(found: Any, kind: Kind) -> str:
-    """Return the initial value of a variable."""
+    """Return the initial values of a variable as text."""
     texts = written(found, lambda v: number(v, kind))
     return f"[{', '.join(texts or [number(0, kind)])}]" if isinstance(found, list) else texts[0]
 
 
 def wrapped(line: str) -> str:
-    """Return a long line as several lines."""
+    """Return a line, wrapped if it is too long."""
     if len(line) <= 120:
         return line
     indent = line[: len(line) - len(line.lstrip())] + "    "

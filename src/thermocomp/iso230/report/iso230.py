@@ -16,7 +16,7 @@ Settlings = Sequence[tuple[Recording, Sequence[Settling]]]
 
 
 def render(thermal: Sequence[ThermalTest], settlings: Settlings, positioned: Sequence[PositioningResult]) -> str:
-    """Return the page."""
+    """Return the page about ISO 230 tests as self-contained HTML."""
     names = [t.name for t in thermal] + list(dict.fromkeys(Path(r.test.source).name for r in positioned))
     return page(
         "iso230.html",

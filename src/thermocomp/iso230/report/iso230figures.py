@@ -59,7 +59,7 @@ def _panels(test: ThermalTest) -> list[tuple[str, str, Sequence[ThermalCurve]]]:
 
 
 def _draw(ax: Axes, test: ThermalTest, curves: Sequence[ThermalCurve]) -> None:
-    """Draw curves, and dashed their residuals with a model."""
+    """Draw curves as solid lines, and their residuals with a model as dashed lines."""
     hours = test.time / HOUR
     ax.axhline(0, color="#aaa", lw=0.8)
     if len(curves) > len(COLOURS):

@@ -1,4 +1,4 @@
-"""The program in LLVM's intermediate representation, for any compensator: its variables stand in flat arrays."""
+"""The program in LLVM's intermediate representation, for any compensator: its variables are in flat arrays."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -52,7 +52,7 @@ def write_module(functions: Sequence[Callable[..., None]]) -> str:
 
 
 class _Writer:
-    """Writer of one function."""
+    """Translator of one function of the program to LLVM's intermediate representation."""
 
     def __init__(self, function: Function) -> None:
         self._function = function
@@ -217,7 +217,7 @@ class _Writer:
         return self._new(f"{(_FLOATS if kind == 'double' else _INTEGERS)[node.operator]} {kind} {left}, {right}")
 
     def _chosen(self, kind: str, test: Expression, one: Expression, other: Expression) -> str:
-        """Return one of two values; only this one is computed."""
+        """Return a conditional expression: only the selected one of two values is computed."""
         then, otherwise, end = self._labels("one", "other", "chosen")
         self._branch(test, then, otherwise)
         found = []

@@ -1,4 +1,4 @@
-"""Procedures of the program as machine code of this computer."""
+"""Procedures of a compensator's program, compiled to machine code of this computer."""
 
 import ctypes
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Procedures over all rows of a test, in the language of the program."""
+"""Procedures that process all rows of a test, in the language of `thermocomp.runtime.program`."""
 
 from thermocomp.runtime.program.language import each, procedure
 from thermocomp.runtime.program.variables import Constants, Kept, TestRows, Work

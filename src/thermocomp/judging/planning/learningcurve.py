@@ -38,7 +38,7 @@ class Level(NamedTuple):
 
     learned: int  #: number of training cycles, or speeds
     rms: float  #: mean over the unseen blocks [um]
-    error: float  #: standard error of this mean between the blocks [um]; nan with a single block
+    error: float  #: standard error of this mean over the blocks [um]; nan with a single block
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class LearningCurve:
 
     @property
     def words(self) -> str:
-        """Return the interpretation of the curve."""
+        """Return the interpretation of the learning curve as text."""
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"

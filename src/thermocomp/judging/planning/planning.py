@@ -216,7 +216,7 @@ def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> Fl
 
 
 def _foretell(trial: Trial, doubt: Doubt, swing: float, ambient: BoolArray) -> FloatArray:
-    """Return the predicted features of a test."""
+    """Return the predicted features of a planned test, (n_rows, n_features)."""
     speed = np.concatenate([np.full(round(d / _STEP), v) for v, d in trial.steps])
     if trial.kind != "room":
         return doubt.table(speed, _STEP)[::_EVERY]

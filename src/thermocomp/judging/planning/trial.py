@@ -29,7 +29,7 @@ class Trial:
 
     @property
     def duration(self) -> float:
-        """Total duration [s]."""
+        """Total duration of the test [s]."""
         return sum(duration for _, duration in self.steps)
 
     @property

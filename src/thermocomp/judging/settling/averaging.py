@@ -1,4 +1,4 @@
-"""Averages over a stated time and their uncertainty: no single noisy row determines the result of a curve.
+"""Averages over a given time and their uncertainty: no single noisy row determines the result of a curve.
 
 Estimation of the noise: the robust scatter of second differences between rows gives the noise that is independent from
 row to row; the scatter of third differences of means over `WINDOW` gives the noise left in a mean, whatever the
@@ -19,7 +19,7 @@ from thermocomp.core.arrays import FloatArray
 WINDOW = 600.0
 #: shorter curves are averaged over this fraction of their length, so that enough means are left for comparison
 SHARE = 1.0 / 8.0
-#: probability that a curve of pure noise is reported as moving
+#: probability that a curve of pure noise is reported as changing
 RISK = 0.01
 #: coverage factor of an expanded uncertainty (GUM)
 K = 2.0
@@ -146,7 +146,7 @@ def replace_outliers(values: FloatArray) -> FloatArray:
 
 
 def noise_of(time: FloatArray, values: FloatArray, stop: int | None = None) -> Noise:
-    """Estimate the noise of a curve, and detect whether it moves beyond the noise.
+    """Estimate the noise of a curve, and detect whether the curve changes by more than its noise.
 
     Parameters
     ----------

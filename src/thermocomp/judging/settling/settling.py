@@ -98,7 +98,7 @@ class Settling:
 
     @property
     def words(self) -> str:
-        """Return cautions for the reader; empty if there are none."""
+        """Return cautions about the reported times, as text; empty if there are none."""
         if not self.moves:
             return "does not move"
         if not self.clear:

@@ -55,7 +55,7 @@ class SteadyState:
 
     @property
     def limit(self) -> float:
-        """Largest sufficient uncertainty [unit]."""
+        """Largest uncertainty of the steady state with which the phase may end [unit]."""
         return max(SHARE * max(self.largest, abs(self.final)), LEAST)
 
     @property
@@ -98,7 +98,7 @@ class Running:
 
     @property
     def words(self) -> str:
-        """Return the recommended action."""
+        """Return the recommended action as text: end the phase, or continue."""
         what = f"{self.phase.kind} {self.phase.number}, {self.seconds / 3600:.1f} h"
         if self.may_stop:
             then = (

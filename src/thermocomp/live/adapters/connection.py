@@ -9,7 +9,7 @@ from thermocomp.core.ports import LinkStatus
 
 @dataclass
 class Connection:
-    """Status of a connection."""
+    """Status of a source or sink, and the time of its last change."""
 
     now: LinkStatus = field(default=LinkStatus("closed"))
 

@@ -67,7 +67,7 @@ class Broker:
 
 @dataclass(kw_only=True)
 class MqttSource(Broker):
-    """Readings from a topic.
+    """Source of readings from an MQTT topic.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class MqttSource(Broker):
 
 @dataclass(kw_only=True)
 class MqttSink(Broker):
-    """Corrections to a topic."""
+    """Sink that publishes corrections on an MQTT topic."""
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
         """Publish corrections, or raise `ThermocompError` with the reason."""

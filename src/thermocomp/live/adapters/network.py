@@ -17,7 +17,7 @@ _TOPIC, _HOST, _LABEL = 65_535, 253, 63
 
 @dataclass(frozen=True, kw_only=True)
 class OnBroker:
-    """Source or sink on an MQTT topic.
+    """Common part of the configuration of sources and sinks on an MQTT topic.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class OnBroker:
 
 @dataclass(frozen=True, kw_only=True)
 class MqttIn(OnBroker):
-    """Readings from an MQTT topic.
+    """Configuration of an MQTT topic as a source of readings.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class MqttIn(OnBroker):
 
 @dataclass(frozen=True, kw_only=True)
 class MqttProbing(OnBroker):
-    """Measurements of the tool point from an MQTT topic.
+    """Configuration of an MQTT topic as a source of measurements of the tool point.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class MqttProbing(OnBroker):
 
 @dataclass(frozen=True, kw_only=True)
 class MqttOut(OnBroker):
-    """Corrections to an MQTT topic.
+    """Configuration of an MQTT topic as a sink.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ from thermocomp.virtual.protocolfile import read_protocol
 
 @dataclass(kw_only=True)
 class Played:
-    """Rows of a recording, played back at their times.
+    """Source of readings that plays back the rows of a recording at their times.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Played:
         self._connection.to("connected")
 
     async def readings(self) -> AsyncIterator[Reading]:
-        """Return rows when they are due, up to the last one."""
+        """Return the rows as readings when they are due, up to the last one."""
         if self._rows is None:
             raise ThermocompError("not connected")
         while (row := self._next()) is not None:
@@ -71,7 +71,7 @@ class Played:
         self._connection.to("closed", "replayed to the end")
 
     def _next(self) -> tuple[float, dict[str, float]] | None:
-        """Return the next row; None after the last one."""
+        """Return the next row of the recording; None after the last one."""
         assert self._rows is not None
         try:
             return next(self._rows, None)
@@ -81,17 +81,17 @@ class Played:
             raise
 
     def status(self) -> LinkStatus:
-        """Return the status without blocking."""
+        """Return the connection status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
-        """Stop; idempotent."""
+        """Stop the playback; idempotent."""
         self._connection.to("closed")
 
 
 @dataclass(kw_only=True)
 class ReplaySource(Played):
-    """A recording in thermocomp's own CSV format, played back."""
+    """Source that plays back a recording in thermocomp's own CSV format."""
 
     path: Path
 
@@ -101,7 +101,7 @@ class ReplaySource(Played):
 
 @dataclass(kw_only=True)
 class SimulatedSource(Played):
-    """The virtual machine.
+    """Source that runs an experiment on the virtual machine.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class SimulatedSource(Played):
 
 @dataclass(kw_only=True)
 class FileSink:
-    """The corrections in force as a file that is replaced atomically each time."""
+    """Sink that writes the corrections in force to a file, replaced atomically each time."""
 
     path: Path
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
@@ -147,7 +147,7 @@ class FileSink:
         self._connection.to("connected")
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
-        """Replace the file, or raise `ThermocompError` with the reason."""
+        """Write the corrections to the file, or raise `ThermocompError` with the reason."""
         text = write_message(corrections, time.time()) + "\n"
         try:
             await asyncio.to_thread(write_text, text, self.path, overwrite=True)
@@ -156,7 +156,7 @@ class FileSink:
             raise ThermocompError(str(e)) from e
 
     async def confirmed(self) -> dict[str, Correction] | None:
-        """Return the content of the file; None if there is none yet."""
+        """Return the corrections in the file; None if the file does not exist yet."""
         try:
             table = json.loads(self.path.read_text(encoding="utf-8"))["corrections"]
             return {
@@ -167,7 +167,7 @@ class FileSink:
             return None
 
     def status(self) -> LinkStatus:
-        """Return the status without blocking."""
+        """Return the connection status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:

@@ -19,7 +19,7 @@ from thermocomp.live.adapters.plain import SimulatedSource
 
 @dataclass(kw_only=True)
 class MqttProbe(Broker):
-    """Measurements from a topic; messages retained by the broker are ignored, so that none is used twice."""
+    """Source of measurements from an MQTT topic; ignores messages retained by the broker: none is used twice."""
 
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
@@ -60,11 +60,11 @@ class SimulatedProbe:
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
 
     async def connect(self, timeout: float) -> None:  # noqa: ARG002 - part of the interface
-        """Set the status to connected."""
+        """Set the connection status to connected."""
         self._connection.to("connected")
 
     async def measurements(self) -> AsyncIterator[Measurement]:
-        """Return a measurement of each target whenever one is due."""
+        """Return a measurement of each target whenever a probing is due."""
         noise = random.Random(self.machine.seed)
         while True:
             await asyncio.sleep(self.every / self.machine.speed)
@@ -81,9 +81,9 @@ class SimulatedProbe:
                     )
 
     def status(self) -> LinkStatus:
-        """Return the status without blocking."""
+        """Return the connection status without blocking."""
         return self._connection.now
 
     async def close(self) -> None:
-        """Stop; idempotent."""
+        """Stop the measurements; idempotent."""
         self._connection.to("closed")

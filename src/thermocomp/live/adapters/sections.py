@@ -38,7 +38,7 @@ class SinkSection(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedIn:
-    """The virtual machine.
+    """Configuration of the virtual machine as a source.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class SimulatedIn:
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayIn:
-    """A recording played back.
+    """Configuration of a recording played back as a source.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class ReplayIn:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedProbing:
-    """Probings of the virtual machine.
+    """Configuration of probings on the virtual machine.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class SimulatedProbing:
 
 @dataclass(frozen=True, kw_only=True)
 class LinuxCncOut:
-    """Corrections for LinuxCNC on this computer.
+    """Configuration of LinuxCNC on this computer as a sink.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class LinuxCncOut:
 
 @dataclass(frozen=True, kw_only=True)
 class FileOut:
-    """Corrections to a file.
+    """Configuration of a file as a sink.
 
     Parameters
     ----------

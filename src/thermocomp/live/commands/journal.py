@@ -117,7 +117,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
 
 
 def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
-    """Return kind and text of a row, formatted for display."""
+    """Return kind and text of a row of the journal, formatted for display."""
     from thermocomp.live.journal.journalrows import (
         MeasurementRow,
         ReferenceRow,

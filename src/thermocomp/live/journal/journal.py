@@ -50,7 +50,7 @@ class JournalLimits:
 
 
 class JournalStatus(NamedTuple):
-    """Status of a journal."""
+    """Status of a journal: its files, and the rows written, waiting and lost."""
 
     file: Path | None  #: file being written; None: none at present
     files: int
@@ -264,7 +264,7 @@ class Journal:
 
 
 class _Damaged(sqlite3.DatabaseError):
-    """A file is a database, but not a valid journal."""
+    """Error for a file that is a database, but not a valid journal."""
 
 
 def _is_damage(error: Exception) -> bool:

@@ -35,7 +35,7 @@ _AT_ONCE = 1e-5
 
 
 class ExportedTarget(NamedTuple):
-    """Data of a target."""
+    """Number of rows of a target with a measurement, and with a known uncompensated deviation."""
 
     name: str
     measured: int  #: number of rows with a measurement
@@ -70,7 +70,7 @@ class _Confirmed:
 
 
 class _Found(NamedTuple):
-    """Relevant rows of a journal, in order of time."""
+    """Readings, measurements and corrections in a journal, in order of time."""
 
     time: FloatArray  #: (n,) time of the readings [s]
     run: NDArray[np.int64]  #: (n,)

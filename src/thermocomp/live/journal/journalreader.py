@@ -37,7 +37,7 @@ _ROWS = "SELECT run, seq, time, kind, content, crc FROM rows"
 
 
 class StoredRun(NamedTuple):
-    """A row with its run and sequence number."""
+    """A row of the journal, with the number of its run of the service and its sequence number."""
 
     run: int
     seq: int
@@ -45,7 +45,7 @@ class StoredRun(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """Contents of a journal."""
+    """Summary of a journal: period, numbers of rows by kind, and missing rows."""
 
     files: tuple[Path, ...]
     size_bytes: int
@@ -190,7 +190,7 @@ def size(path: Path) -> int:
 
 
 def checksum(run: int, seq: int, time: float, kind: str, text: str) -> int:
-    """Return the CRC-32 of a row."""
+    """Return the checksum (CRC-32) of a row of the journal."""
     # SQLite does not store -0.0
     return zlib.crc32(f"{run} {seq} {time + 0.0!r} {kind} {text}".encode())
 

@@ -52,7 +52,7 @@ class ReadingRow(NamedTuple):
 
 
 class DemandRow(NamedTuple):
-    """A demanded correction."""
+    """The correction that the compensator demands for a target, when it changes."""
 
     time: float
     target: str
@@ -68,7 +68,7 @@ class ConfirmationRow(NamedTuple):
 
 
 class StateRow(NamedTuple):
-    """Status of a target, valid from its time."""
+    """Status of a target, valid from the time of this row until the next one."""
 
     time: float
     target: str
@@ -77,7 +77,7 @@ class StateRow(NamedTuple):
 
 
 class ReferenceRow(NamedTuple):
-    """Re-zeroing of a target."""
+    """New zero of a target, and the reason for it."""
 
     time: float
     target: str
@@ -153,9 +153,10 @@ _NAMES = {kind: name for name, kind in KINDS.items()}
 def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | None = None) -> float | None:
     """Return the uncompensated deviation from a measurement [um].
 
-    At the probed position the tool point is on its nominal position: the motor positions are off by minus the
-    deviation. A reported position that includes the correction therefore gives the full deviation; one without it gives
-    the residual under the correction. So the correction is subtracted once in the second case, and never in the first.
+    At the probed position the tool point is on its nominal position: the motor positions differ from their nominal
+    values by minus the deviation. A reported position that includes the correction therefore gives the full deviation;
+    one without it gives the residual under the correction. So the correction is subtracted once in the second case, and
+    never in the first.
 
     Returns
     -------
@@ -174,7 +175,7 @@ def measured_by(row: MeasurementRow, start: StartRow, in_force: Correction | Non
 
 
 def kind_of(row: Row) -> str:
-    """Return the name of the kind of a row."""
+    """Return the name of the kind of a journal row."""
     found = _NAMES.get(type(row))
     if found is None:
         raise ValueError(f"{type(row).__name__} is not a row of a journal")
@@ -182,7 +183,7 @@ def kind_of(row: Row) -> str:
 
 
 def dumps(row: Row, start: StartRow) -> str:
-    """Return a row without its time as ASCII text."""
+    """Return a journal row, without its time, as ASCII text."""
     name = kind_of(row)
     to_number(row.time)
     if isinstance(row, StartRow):
@@ -195,7 +196,7 @@ def dumps(row: Row, start: StartRow) -> str:
 
 
 def loads(kind: str, time: float, text: str, start: StartRow | None) -> Row:
-    """Return the row encoded by `dumps`."""
+    """Return the journal row from text written by `dumps`."""
     value = json.loads(text)
     want(kind in KINDS, kind, "kind", f"one of {', '.join(KINDS)}")
     if kind == "start":

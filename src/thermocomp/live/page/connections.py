@@ -36,7 +36,7 @@ class Guarded(H11Protocol):
             min(others, key=Guarded._rank).drop()
 
     def on_response_complete(self) -> None:
-        """Wait for the next request."""
+        """Note that the answer is complete and the client may send the next request."""
         self._since, self._served = time.monotonic(), True
         super().on_response_complete()
 
@@ -46,7 +46,7 @@ class Guarded(H11Protocol):
         return self.transport.get_write_buffer_size()
 
     def drop(self) -> None:
-        """Close immediately and discard unsent data."""
+        """Close the connection immediately and discard unsent data."""
         self.connections.discard(self)
         self.transport.abort()
 

@@ -1,4 +1,4 @@
-"""Access control of the page: permitted host names, permitted origins, and authorisation of orders."""
+"""Access control of the page: permitted host names, permitted origins, and authorisation of commands."""
 
 import contextlib
 import hmac
@@ -20,7 +20,7 @@ from thermocomp.core.shown import shorten
 
 #: number of wrong tokens per minute that are answered with 401
 MOST_WRONG = 5
-#: maximum size of an order [bytes]
+#: maximum size of a command [bytes]
 MOST_BYTES = 2_000
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
@@ -44,7 +44,7 @@ class Json(JSONResponse):
     """
 
     def render(self, content: Any) -> bytes:
-        """Return the content as bytes; see `write_json`."""
+        """Return the content of the response as bytes; see `write_json`."""
         return write_json(content)
 
 
@@ -60,12 +60,12 @@ def write_json(content: Any) -> bytes:
 
 
 class Doorkeeper:
-    """Authorises orders by a token; wrong tokens are rate-limited, the right one never is.
+    """Authorises commands by a token; wrong tokens are rate-limited, the right one never is.
 
     Parameters
     ----------
     token : str
-        Empty: no orders are accepted.
+        Empty: no commands are accepted.
     """
 
     def __init__(self, token: str) -> None:
@@ -73,7 +73,7 @@ class Doorkeeper:
         self._wrong = deque[float](maxlen=MOST_WRONG)
 
     def check(self, given: str) -> None:
-        """Raise unless an order is authorised.
+        """Raise unless a command is authorised.
 
         Every token is compared: if wrong tokens could lock the page, anyone who can reach it could prevent the operator
         from holding the machine's correction. A token of 16 characters or more cannot be guessed.

@@ -1,4 +1,4 @@
-"""Manual orders: run, hold, shadow, rezero, roll back; authorised by the token."""
+"""Manual commands: run, hold, shadow, rezero, roll back; authorised by the token."""
 
 from typing import Annotated, Literal
 
@@ -15,7 +15,7 @@ from thermocomp.runtime.state import Status
 
 
 class PageOrder(BaseModel):
-    """Request body of an order."""
+    """Request body of a command."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
     target: Annotated[str, Field(max_length=200)]
@@ -44,7 +44,7 @@ def make_router(board: Board) -> APIRouter:
 
 
 def read_order(body: bytes) -> PageOrder:
-    """Return the order in the body of a request."""
+    """Return the command in the body of a request."""
     try:
         content = parse_json(body)
     except ValueError as e:
@@ -57,7 +57,7 @@ def read_order(body: bytes) -> PageOrder:
 
 
 def give(service: Service, wanted: PageOrder) -> str:
-    """Carry out an order; return the reason if impossible, else an empty string."""
+    """Carry out a command; return the reason if impossible, else an empty string."""
     target = wanted.target
     if wanted.do == "rezero":
         service.rezero(target, "by hand, on the page")

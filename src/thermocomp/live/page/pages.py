@@ -17,14 +17,14 @@ _FOLDER = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Board:
-    """Data that a page shows and orders that it may give.
+    """Data that a page shows, and commands that it may give.
 
     Parameters
     ----------
     service : Service
         The service, with the state and the events of its compensator.
     token : str
-        Token required for orders; empty: no orders are accepted.
+        Token required for commands; empty: no commands are accepted.
     settled : float
         A drift below this in ten minutes counts as settled [um].
     """
@@ -50,5 +50,5 @@ MakeRouter = Callable[[Board], APIRouter]
 
 
 def read_template(name: str) -> jinja2.Template:
-    """Return a template of the service's own pages."""
+    """Return the text of an HTML template of the service's own pages."""
     return jinja2.Environment(loader=jinja2.FileSystemLoader(_FOLDER), autoescape=True).get_template(name)

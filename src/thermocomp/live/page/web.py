@@ -43,7 +43,7 @@ class _Server(uvicorn.Server):
 
 
 def read_token(path: Path) -> str:
-    """Return the token in a file."""
+    """Return the token in a file, or raise an error if it is missing or too short."""
     try:
         token = path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError) as e:
@@ -57,7 +57,7 @@ def read_token(path: Path) -> str:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a listening socket."""
+    """Return a socket that listens on the host and port of the page."""
     bare = host.removeprefix("[").removesuffix("]")
     try:
         found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
@@ -74,7 +74,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 async def serve(app: FastAPI, listening: socket.socket) -> None:
-    """Serve an application until it is cancelled."""
+    """Serve the web application of the page until cancelled."""
     config = uvicorn.Config(
         app,
         http=Guarded,
@@ -103,6 +103,6 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
 
 
 async def _turn() -> None:
-    """Let the loop finish the setup of accepted connections: it takes four turns."""
+    """Let the event loop finish the setup of accepted connections, which takes four iterations."""
     for _ in range(4):
         await asyncio.sleep(0)

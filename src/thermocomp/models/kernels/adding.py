@@ -23,7 +23,7 @@ DIGITS = 1e-14
 def try_exactly(
     columns: FloatArray, least: FloatArray, lists: Lists, inside: ByteArray, chosen: IntArray, n: int
 ) -> None:
-    """Add the first `n` of `chosen` to the list if QR confirms them."""
+    """Add the set of the first `n` columns of `chosen` to the list of good sets if its QR value is good enough."""
     value = exact(columns, least, chosen, n)
     if value < lists[3][n]:
         inside[:] = 0

@@ -17,7 +17,7 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
 class _Lanes(types.Type):
-    """Type of a vector of eight numbers."""
+    """numba type of a vector of eight numbers."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")

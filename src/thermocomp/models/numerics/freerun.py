@@ -35,7 +35,7 @@ class Coefficients:
     intercept: float = 0.0
 
     def ticked(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each tick, (n_ticks + 1,)."""
+        """Return the deviation at each tick in free run from a cold start, (n_ticks + 1,)."""
         products = self.b @ run.drive.T
         driven = products[0] + self.intercept
         for i in range(1, len(self.b)):
@@ -49,7 +49,7 @@ class Coefficients:
         return value
 
     def at_rows(self, run: TickedRun) -> FloatArray:
-        """Run freely from a cold start; return the deviation at each row of the test."""
+        """Return the deviation at each row of the test in free run from a cold start."""
         ticked = self.ticked(run)
         k, m = len(self.a), len(self.b) - 1
         return ticks.interpolate_at_rows(
@@ -160,7 +160,7 @@ class _Problem:
         return [self.best_for(np.array([*some, *[0.0] * (self._k - len(some))])) for some in chosen]
 
     def best_for(self, poles: FloatArray) -> FloatArray:
-        """Return theta for given poles; the other parameters are linear."""
+        """Return theta for given poles, with the other parameters by linear least squares."""
         table = self._driven(polynomial(poles))
         scale = np.linalg.norm(table, axis=0)
         scale[scale == 0] = 1.0

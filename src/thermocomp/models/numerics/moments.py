@@ -30,7 +30,7 @@ def accumulate(tables: Iterable[tuple[slice, FloatArray]], targets: FloatArray, 
 
 
 def part(moments: FloatArray, columns: IntArray) -> FloatArray:
-    """Return the moments of selected features, the constant and y."""
+    """Return the part of a moment matrix that belongs to selected features, the constant and y."""
     keep = np.append(columns, [len(moments) - 2, len(moments) - 1])
     return np.asarray(moments[np.ix_(keep, keep)])
 

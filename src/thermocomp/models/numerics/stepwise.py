@@ -1,4 +1,4 @@
-"""Stepwise regression: one engine on a triangular factor, two rules.
+"""Stepwise regression on a triangular factor, with fixed thresholds on partial F or significance levels.
 
 The data are factorised once (`thermocomp.models.numerics.leastsquares.triangle`); every step then works on the small
 triangular factor. Columns enter by a Householder reflection and leave by Givens rotations, so all candidates remain
@@ -54,11 +54,11 @@ class FThresholds:
             )
 
     def enter_f(self, df: int) -> float:  # noqa: ARG002
-        """Return F_E."""
+        """Return F_E, the threshold on partial F to enter."""
         return self.enter
 
     def delete_f(self, df: int) -> float:  # noqa: ARG002
-        """Return F_D."""
+        """Return F_D, the threshold on partial F to stay."""
         return self.delete
 
     def __str__(self) -> str:
@@ -164,7 +164,7 @@ class StepwiseStep:
 
     @property
     def r(self) -> float:
-        """Multiple correlation after the step."""
+        """Multiple correlation R of the model after the step."""
         return math.sqrt(max(self.r_squared, 0.0))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray, IntArray
 
-#: a structure's share is its RMS error (geometric mean over the left-out parts) raised to minus this power
+#: weight of a regression in the average: its RMS error (geometric mean over left-out parts) to minus this power
 TRUST = 3.0
 
 
@@ -56,7 +56,7 @@ class Moments:
 
 
 def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
-    """Return the weights of the features, averaged over structures, and the error of the average on left-out parts.
+    """Return the weights of the features, averaged over regressions, and the error of the average on left-out parts.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def average(moments: Moments, structures: Sequence[LagStructure]) -> tuple[Float
 
 
 def fit_each(moments: Moments, structures: Sequence[LagStructure], parts: Iterable[int]) -> FloatArray:
-    """Return the weights of the features in each structure, fitted to the given parts.
+    """Return the weights of the features in each regression, fitted to the given parts.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ def _fit_all(moments: Moments, structures: Sequence[LagStructure], groups: Seque
 
 
 def share_out(moments: Moments, structures: Sequence[LagStructure]) -> tuple[FloatArray, FloatArray]:
-    """Return the shares of structures in their average, (n_structures, n_targets), and the errors as `average` does.
+    """Return the shares of regressions in their average, (n_structures, n_targets), and the errors as `average` does.
 
-    Each part is left out in turn. The share of a structure decreases with its error on left-out parts, see `TRUST`.
+    Each part is left out in turn. The share of a regression decreases with its error on left-out parts, see `TRUST`.
     """
     n_parts, n_targets = len(moments.rows), moments.cross.shape[2]
     shares = np.full((len(structures), n_targets), 1 / len(structures))

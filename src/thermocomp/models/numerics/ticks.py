@@ -48,7 +48,7 @@ class TickedRun:
 
 
 def check_steps(dt: ArrayLike, n_rows: int) -> FloatArray:
-    """Check time steps [s]."""
+    """Return time steps [s] as an array; raise `InputError` if one is negative or not a number."""
     found = np.asarray(dt, dtype=np.float64)
     if found.shape != (n_rows,) or not (found >= 0).all():
         raise InputError(f"dt: expected {n_rows} non-negative time steps [s], the time since the previous row")

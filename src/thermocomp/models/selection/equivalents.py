@@ -66,7 +66,7 @@ class Equivalents:
 
 @dataclass(frozen=True)
 class SensorSet:
-    """One set of sensors.
+    """One set of sensors, compared with the best sets.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ def _free(tri: Triangle, needed: int) -> int:
 
 
 def _first(values: FloatArray) -> int:
-    """Return the first index of the smallest value, within rounding."""
+    """Return the index of the smallest value; of values equal within rounding, the first."""
     return int(np.argmax(values <= values.min() * (1 + SAME)))
 
 

@@ -18,7 +18,7 @@ Share = Callable[[Callable[[Any], FloatArray], Sequence[Any]], Iterable[FloatArr
 
 @dataclass(frozen=True, eq=False)
 class DataSet:
-    """One test, as arrays.
+    """Temperatures and displacements of one test, as arrays.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.models.numerics.structures import Moments, average, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 
-#: structures for the errors of sensor sets on left-out parts; ranking sets requires fewer than a model
+#: number of averaged regressions for the errors of sensor sets on left-out parts: fewer than for a model suffice
 _STRUCTURES = 30
 
 
@@ -80,7 +80,7 @@ class StandInAnswer:
 
     @property
     def temperatures(self) -> FloatArray:
-        """Mean products of the temperatures themselves [degC^2]."""
+        """Mean products of the temperatures with each other, without their lags [degC^2]."""
         return self.gram[: self.copies.shape[1], : self.copies.shape[1]]
 
     def lose(self, made: FloatArray) -> FloatArray:

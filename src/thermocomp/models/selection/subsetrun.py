@@ -62,7 +62,7 @@ class SearchResult:
         return sorted((v, c) for c, v in found.items())
 
     def leave_open(self, least: FloatArray) -> None:
-        """Record the lower bound of the sets that were not examined."""
+        """Record the lower bound of the residual sums of squares of the sets that were not examined."""
         self._open = np.minimum(self._open, least)
 
 
@@ -76,7 +76,7 @@ def run(
     seconds: float | None,
     progress: Callable[[str], None] | None,
 ) -> SearchResult:
-    """Run the search.
+    """Search the best subsets of each size.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def run(
 
 
 class _Watch:
-    """Stop conditions of a search, and its progress receiver."""
+    """Stop conditions of a search, and the receiver of its progress."""
 
     def __init__(
         self, result: SearchResult, nodes: int | None, seconds: float | None, progress: Callable[[str], None] | None

@@ -83,7 +83,7 @@ class Subsets:
 
     @property
     def proven(self) -> bool:
-        """True if all of `best` are proven."""
+        """True if all sets in `best` are proven to be the best of their size."""
         return all(s.proven for s in self.best)
 
     @property

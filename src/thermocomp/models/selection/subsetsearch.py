@@ -124,12 +124,12 @@ class Search:
         return np.full(len(self.inside) + 1, np.inf)
 
     def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
-        """Return the columns of a set."""
+        """Return the indices of the columns of a set."""
         return tuple(np.flatnonzero(flags).tolist())
 
 
 class Swapping(Search):
-    """Good initial sets; the search ends immediately."""
+    """Fast search for good initial sets by exchanging columns, without branches."""
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)
@@ -139,7 +139,7 @@ class Swapping(Search):
 
 
 class Dropping(Search):
-    """Branch and bound from the full set downwards."""
+    """Branch and bound over the sets that remain when columns are removed from the full set."""
 
     def __init__(self, problem: Problem, sizes: int, n_best: int, limit: FloatArray, bound: FloatArray) -> None:
         super().__init__(problem, sizes, n_best, limit, bound)
@@ -157,16 +157,16 @@ class Dropping(Search):
         self.tasks = p - 1
 
     def start(self, first: int, last: int) -> None:
-        """Start with the given branches of the root."""
+        """Set the branches of the root to search, from `first` up to but excluding `last`."""
         self._orders[1, 0, : last - first] = range(first, last)
         self._numbers[2, 0] = last - first
 
     def go_on(self, budget: int) -> int:
-        """Examine about `budget` sets."""
+        """Examine about `budget` sets and return their number; 0 if there are no more."""
         return int(self._drop(self._state, self.lists, self.inside, budget))
 
     def open_from(self) -> FloatArray:
-        """Return a lower bound of the sums of the unexamined sets, per size."""
+        """Return a lower bound of the sums of squares of the unexamined sets of each size."""
         least = np.full(len(self.inside) + 1, np.inf)
         many, sizes, left = self._numbers[:3]
         for d in range(int(self._numbers[5, 0]) + 1):
@@ -178,7 +178,7 @@ class Dropping(Search):
 
 
 class Adding(Search):
-    """All sets up to a size."""
+    """Enumeration of all sets up to a given size."""
 
     chunk = 4_000_000
 
@@ -202,20 +202,20 @@ class Adding(Search):
         self.tasks = p
 
     def start(self, first: int, last: int) -> None:
-        """Start with the given branches of the root."""
+        """Set the branches of the root to search, from `first` up to but excluding `last`."""
         self._numbers[1:, 0] = first, last - 1
 
     def go_on(self, budget: int) -> int:
-        """Examine about `budget` sets."""
+        """Examine about `budget` sets and return their number; 0 if there are no more."""
         return int(self._add(self._columns, self._least, self._state, self.lists, self.inside, self._sizes, budget))
 
     def open_from(self) -> FloatArray:
-        """Return a lower bound of the sums of the unexamined sets, per size."""
+        """Return a lower bound of the sums of squares of the unexamined sets of each size."""
         over = self._numbers[0, 0] == 0 and self._numbers[1, 0] > self._numbers[2, 0]
         return np.full(len(self.inside) + 1, np.inf if over else self.problem.full_rss)
 
     def columns(self, flags: NDArray[np.uint8]) -> tuple[int, ...]:
-        """Return the columns of a set."""
+        """Return the indices of the columns of a set."""
         return tuple(sorted(self._order[i] for i in np.flatnonzero(flags)))
 
 

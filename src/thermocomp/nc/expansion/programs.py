@@ -1,4 +1,4 @@
-"""Programs in a Fanuc file, with their line numbers and loops."""
+"""Programs in a Fanuc file, with the positions of their N numbers and loops."""
 
 import re
 from collections.abc import Sequence
@@ -79,7 +79,7 @@ class File:
             self._programs.setdefault(number, []).append(own)
 
     def find(self, number: int, line: int, who: str) -> Program:
-        """Return the program with a given number."""
+        """Return the program with a given O number."""
         found = self._programs.get(number, [])
         if len(found) == 1:
             return found[0]

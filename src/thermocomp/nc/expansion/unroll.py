@@ -57,7 +57,7 @@ def unroll(lines: Iterable[str], setup: Setup) -> Iterator[tuple[str, int]]:
 
 @dataclass(slots=True)
 class _Frame:
-    """State of a program that is being run."""
+    """State of a program or macro that is being executed."""
 
     program: Program
     variables: Variables
@@ -121,14 +121,14 @@ class _Unroller:
         return _ENDED
 
     def _read(self, index: int) -> Line | None:
-        """Return a line that may have an effect; None if it is plain."""
+        """Return a parsed line that may call, jump or set a variable; None if it is plain."""
         if index not in self._read_lines:
             text = self._texts[index]
             self._read_lines[index] = read_line(text, index + 1, "fanuc") if _MAY_ACT.search(text) else None
         return self._read_lines[index]
 
     def _line(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run one line; return None if the program continues after it."""
+        """Execute one line; return None if the program continues after it."""
         if line.flow or line.assignments:
             self._act(line)
             if line.flow:
@@ -161,7 +161,7 @@ class _Unroller:
     # -- calls -------------------------------------------------------------------------------------------------------
 
     def _call(self, frame: _Frame, line: Line, code: int) -> Generator[tuple[str, int], None, int | None]:
-        """Run M98 or M97."""
+        """Execute M98 or M97."""
         number = self._count(frame, line, "P", 0)
         told = [letter for letter in "LK" if any(w.letter == letter for w in line.words)]
         if not number or len(told) > 1:
@@ -177,7 +177,7 @@ class _Unroller:
         return (yield from self._repeat(frame, line, program, place, times, None))
 
     def _macro(self, frame: _Frame, line: Line) -> Generator[tuple[str, int], None, int | None]:
-        """Run G65."""
+        """Execute G65."""
         self._act(line)
         number, times = self._count(frame, line, "P", 0), self._count(frame, line, "L", 1)
         if not number:
@@ -329,7 +329,7 @@ class _Unroller:
         return default
 
     def _act(self, line: Line) -> None:
-        """Note a line that calls, jumps or sets a variable."""
+        """Record that a line calls, jumps or sets a variable."""
         self._acted = True
         if line.optional:
             raise line.fault("an optional line (/) that calls, jumps or sets a variable: give --block-delete on")

@@ -42,7 +42,7 @@ class Variables:
         return Variables({**self._common(), **arguments}, macro=True)
 
     def returned(self, inner: "Variables") -> None:
-        """Adopt the common variables of a macro that has returned."""
+        """Take over the common variables (#100 and up) from a macro that has returned."""
         own: dict[Key, float] = {key: self._parameters[key] for key in _LOCAL if key in self._parameters}
         common = inner._common()
         self.changes += common != self._common()
@@ -52,7 +52,7 @@ class Variables:
         return {key: self._parameters[key] for key in _COMMON if key in self._parameters}
 
     def assign(self, line: int, assignment: Assignment) -> None:
-        """Carry out one assignment."""
+        """Execute one assignment to a variable."""
         try:
             key = self._parameters.key(assignment.target)
             if key not in _LOCAL and key not in _COMMON:
@@ -70,7 +70,7 @@ class Variables:
             raise ProgramError(line, f"a variable: {error}") from None
 
     def value(self, line: int, text: str, what: str, *, word: bool = True) -> float:
-        """Return the value of an expression."""
+        """Return the value of an expression with variables."""
         try:
             return evaluate(text, self._parameters, word=word)
         except InputError as error:

@@ -21,7 +21,7 @@ Flat = tuple[float, float]
 
 
 class ArcError(Exception):
-    """Impossible arc; the message gives the reason."""
+    """Error for an arc that is geometrically impossible; the message gives the reason."""
 
 
 def check_centre(start: Flat, end: Flat, centre: Flat, inch: bool) -> None:

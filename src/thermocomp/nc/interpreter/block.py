@@ -180,7 +180,7 @@ class Block:
     sticky: dict[str, float] = field(default_factory=dict)
 
     def error(self, reason: str) -> ProgramError:
-        """Return an error for this line."""
+        """Return a `ProgramError` with the number of this line."""
         return self.line.fault(reason)
 
 

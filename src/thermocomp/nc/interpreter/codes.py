@@ -16,14 +16,14 @@ AXES: Final = ("X", "Y", "Z")
 #: the operator decides when the program continues
 STOPS: Final = frozenset({"M0", "M1", "M60"})
 ROTARY: Final = frozenset("ABC")
-#: words whose value is a length in a line with a motion, an offset or a cycle
+#: words whose value is a length on a line with a motion, an offset or a cycle
 LENGTHS: Final = frozenset("XYZIJKRQ")
-#: letters allowed in every line
+#: letters allowed on every line
 FREE: Final = frozenset("XYZABCFST")
 
 
 class Code(NamedTuple):
-    """One code; a line can have only one code of each group."""
+    """A G or M code and its modal group; a line can have only one code of each group."""
 
     name: str  #: such as ``G38.2``
     group: str
@@ -222,7 +222,7 @@ M_CODES: Final[dict[Controller, dict[float, Code]]] = {
 
 
 def list_names(*groups: str) -> set[str]:
-    """Return the codes of modal groups, of all controllers."""
+    """Return the names of the codes in given modal groups, for all controllers."""
     tables = (*G_CODES.values(), *M_CODES.values())
     return {code.name for table in tables for code in table.values() if code.group in groups}
 
@@ -259,7 +259,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
     },
 }
 
-#: letters that are refused in every line
+#: letters that are refused on every line
 REFUSED_LETTERS: Final[dict[str, str]] = {
     "U": "the axes U V W are not supported; write a dwell as G4 P, or on a Fanuc as G4 X",
     "V": "the axes U V W are not supported",

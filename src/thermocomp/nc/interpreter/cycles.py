@@ -15,11 +15,11 @@ MOST: Final = 100_000
 
 
 class CycleError(Exception):
-    """Impossible cycle; the message gives the reason."""
+    """Error for a canned cycle with invalid words; the message gives the reason."""
 
 
 class CycleMove(NamedTuple):
-    """A move of a cycle."""
+    """One move of a canned cycle."""
 
     rapid: bool
     place: Point  #: program coordinates, in program units

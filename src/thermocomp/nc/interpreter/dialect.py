@@ -69,7 +69,7 @@ _BEHIND = "is a comment for LinuxCNC, and the next block for a Fanuc: remove it,
 
 
 class Place(NamedTuple):
-    """Item found in a program."""
+    """Position and description of something found in a program."""
 
     line: int
     text: str  #: text as written
@@ -180,7 +180,7 @@ class _Scan:
         return True
 
     def take(self, number: int, text: str) -> None:
-        """Process a line."""
+        """Examine a line for signs, hints and ambiguous words."""
         self._line, self._whole, self._text = number, text, text.strip()[:40]
         for mark in _MARKS:
             text = text.removeprefix(mark)

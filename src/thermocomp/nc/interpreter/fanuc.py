@@ -64,7 +64,7 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
 
 
 def rotate(state: InterpreterState, words: BlockWords) -> None:
-    """Run G68 X Y R or G69: rotate X and Y of the program about a point in program coordinates."""
+    """Execute G68 X Y R or G69: rotate X and Y of the program about a point in program coordinates."""
     modal, offsets = state.modal, state.offsets
     if words.groups["rotation"] == "G69":
         if modal.turned:

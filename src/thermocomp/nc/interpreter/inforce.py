@@ -99,7 +99,7 @@ class InForce:
 
     @property
     def mill(self) -> bool:
-        """Whether the machine is not a lathe."""
+        """True if the program shows that the machine is not a lathe."""
         return self.milled and not self.lathe
 
     def takes_p(self, line: LineWords) -> bool:
@@ -109,7 +109,7 @@ class InForce:
 
     @property
     def feed(self) -> bool:
-        """Whether a feed without a decimal point is ambiguous."""
+        """True if a feed without a decimal point is ambiguous."""
         return not self.whole and (self.per_turn or self.unit == " in")
 
     def begins_above(self, line: LineWords) -> bool:
@@ -136,7 +136,7 @@ class InForce:
             self.level = place
 
     def take(self, line: LineWords) -> None:
-        """Process the codes of a line."""
+        """Update the modal state by the codes of a line."""
         codes = set(line.g)
         before = self.motion
         for code in (*MOTIONS, 80.0):

@@ -25,14 +25,14 @@ _CURVES: Final = frozenset({"G5", "G5.1"})
 
 
 def follow_program(lines: Iterable[Line], setup: Setup) -> Iterator[Block]:
-    """Interpret a program."""
+    """Yield the effect of each line of a program on the machine."""
     step = Follower(setup).step
     for line in lines:
         yield step(line)
 
 
 class Follower:
-    """Controller model that runs a program."""
+    """Model of a controller that executes a program line by line."""
 
     def __init__(self, setup: Setup) -> None:
         self.state = InterpreterState(setup)
@@ -45,7 +45,7 @@ class Follower:
         self._if_skipped: str | None = None  # motion in force if the optional lines are not run
 
     def step(self, line: Line) -> Block:
-        """Run one line."""
+        """Execute one line and return its effect."""
         if self._ended:
             return self._idle(line)
         if line.demarcation:
@@ -86,7 +86,7 @@ class Follower:
         return self._idle(line)
 
     def _optional(self, words: BlockWords) -> Block:
-        """Run a line that the operator may skip: refuse it if later lines depend on it."""
+        """Execute a line that the operator may skip: refuse it if later lines depend on it."""
         before, motion = self._summary(), self.state.modal.motion
         block = self._run(words)
         after = self._summary()
@@ -234,7 +234,7 @@ class Follower:
         return force in ("G2", "G3") and not words.values.keys().isdisjoint("IJK") and "once" not in words.groups
 
     def _once(self, words: BlockWords, block: Block, once: str) -> None:
-        """Run a non-modal code, except G53, which belongs to the motion."""
+        """Execute a non-modal code, except G53, which belongs to the motion."""
         state, values = self.state, words.values
         if once == "G4":
             if "P" in values:

@@ -71,7 +71,7 @@ def _unit_needed(state: InterpreterState, words: BlockWords) -> None:
 
 
 def speeds(state: InterpreterState, words: BlockWords, inch: bool) -> None:
-    """Process F, S and T."""
+    """Execute the words F (feed), S (spindle speed) and T (tool)."""
     values = words.values
     if "F" in values:
         word = values["F"]
@@ -157,7 +157,7 @@ def _check_cutter(state: InterpreterState, words: BlockWords) -> None:
 
 
 def _machine_codes(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Process M codes except stops."""
+    """Execute the M codes of a line except stops."""
     groups, values = words.groups, words.values
     tool = groups.get("tool")
     if tool == "M6":

@@ -14,7 +14,7 @@ _SAME_LEVEL = 1e-4
 
 
 def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G0 or G1."""
+    """Execute a linear move, G0 or G1."""
     values = words.values
     rotary = state.turn(words) if "A" in values or "B" in values or "C" in values else 0.0
     if not rotary and not ("X" in values or "Y" in values or "Z" in values or "A" in values):
@@ -35,7 +35,7 @@ def straight(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def in_machine(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G53: the words are machine coordinates."""
+    """Execute G53: the words are machine coordinates."""
     if not state.modal.absolute:
         raise words.error("G53 is not allowed in G91; write G90 before it")
     _refuse_compensated(state, words, "G53")
@@ -68,7 +68,7 @@ def _doubt(state: InterpreterState, axes: dict[int, float]) -> Known:
 
 
 def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G28 or G30: via the point in the words; only the axes in the words move home, all if there are none."""
+    """Execute G28 or G30: via the point in the words; only the axes in the words move home, all if there are none."""
     code = words.groups["once"]
     _refuse_compensated(state, words, code)
     turns = not ROTARY.isdisjoint(words.values)  # whether already there or not
@@ -92,7 +92,7 @@ def home(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def arc(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G2 or G3."""
+    """Execute an arc, G2 or G3."""
     modal, values, scale = state.modal, words.values, state.scale
     first, second, _ = PLANES[modal.plane]
     letters = CENTRE[modal.plane]
@@ -138,7 +138,7 @@ def _centre(state: InterpreterState, words: BlockWords, begin: Flat) -> Flat:
 
 
 def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G33 or G33.1, synchronised with the spindle; G33.1 returns to its start."""
+    """Execute G33 or G33.1, synchronised with the spindle; G33.1 returns to its start."""
     code = state.modal.motion
     if "K" not in words.values:
         raise words.error(f"{code} needs K, the distance per turn")
@@ -160,7 +160,7 @@ def in_step(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G38 or G31: the end of the move is unknown; the target is used as the end."""
+    """Execute G38 or G31: the end of the move is unknown; the target is used as the end."""
     code = state.modal.motion
     _refuse_compensated(state, words, code)
     if state.modal.feed_mode == 95:
@@ -177,7 +177,7 @@ def probe(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G5 or G5.1; the move is recorded as the straight line from start to end."""
+    """Execute G5 or G5.1; the move is recorded as the straight line from start to end."""
     code, values = state.modal.motion, words.values
     if code not in ("G5", "G5.1"):  # codes added to the table must be handled here
         raise words.error(f"{code} is known but not implemented; please report this")
@@ -198,7 +198,7 @@ def curve(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool) -> None:
-    """Run a canned cycle, G73 to G89."""
+    """Execute a canned cycle, G73 to G89."""
     modal, values = state.modal, words.values
     code, scale = modal.motion, state.scale
     _may_drill(state, words)

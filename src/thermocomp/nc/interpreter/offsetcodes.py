@@ -11,7 +11,7 @@ _LENGTH_CERTAIN: Known = (True, True, True)
 
 
 def select_system(state: InterpreterState, words: BlockWords) -> None:
-    """Run G54 to G59.3, Fanuc G54.1 P, or Haas G154 P and G110 to G129."""
+    """Execute G54 to G59.3, Fanuc G54.1 P, or Haas G154 P and G110 to G129."""
     code = words.groups["system"]
     if code in ("G54.1", "G154"):
         number = words.whole("P", least=1)
@@ -25,7 +25,7 @@ def select_system(state: InterpreterState, words: BlockWords) -> None:
 
 
 def tool_length(state: InterpreterState, words: BlockWords) -> None:
-    """Run G43, G43.1, G43.2 or G49."""
+    """Execute a tool length offset: G43, G43.1, G43.2 or G49."""
     code = words.groups["tool length"]
     offsets = state.offsets
     if state.length_inch not in (None, state.modal.inch) and not state.fanuc:
@@ -71,7 +71,7 @@ def _length_number(state: InterpreterState, words: BlockWords, code: str) -> int
 
 
 def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G92 or G52, or a code that cancels or restores them."""
+    """Execute G92 or G52, or a code that cancels or restores them."""
     code = words.groups["once"]
     offsets = state.offsets
     values = state.axis_values(words)
@@ -102,7 +102,7 @@ def local(state: InterpreterState, words: BlockWords, block: Block) -> None:
 
 
 def g10(state: InterpreterState, words: BlockWords, block: Block) -> None:
-    """Run G10: set origins or tool lengths."""
+    """Execute G10: set origins or tool lengths."""
     kind = words.whole("L")
     number = words.whole("P")
     if kind not in (2, 20) and (state.fanuc or kind not in (1, 10, 11)):
@@ -152,7 +152,7 @@ def _origin(state: InterpreterState, words: BlockWords, block: Block, kind: int,
 
 
 def _length(state: InterpreterState, words: BlockWords, block: Block, kind: int, number: int) -> None:
-    """Run G10 L1, L10 or L11: set a tool length in the table; it takes effect with the next G43."""
+    """Execute G10 L1, L10 or L11: set a tool length in the table; it takes effect with the next G43."""
     values = words.values
     if {"X", "Y", "A", "B", "C"} & values.keys():
         raise words.error(f"G10 L{kind} with X, Y or a rotary axis is not supported; Z and R are")

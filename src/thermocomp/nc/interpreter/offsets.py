@@ -20,7 +20,7 @@ EXTERNAL = 0
 
 
 def combine_known(a: Known, b: Known) -> Known:
-    """Return, per axis, whether both are known."""
+    """Return, per axis, whether it is marked as known in both arguments."""
     return (a[0] and b[0], a[1] and b[1], a[2] and b[2])
 
 
@@ -30,7 +30,7 @@ def replace_coordinates(point: Point, values: Mapping[int, float]) -> Point:
 
 
 def mark_axes(known: Known, axes: Mapping[int, object], to: bool) -> Known:
-    """Return `known` with the value of some axes replaced."""
+    """Return `known` with some axes marked as known or unknown."""
     return triple(to if i in axes else was for i, was in enumerate(known))
 
 
@@ -97,7 +97,7 @@ class Offsets:
         return self.system in self.rotations and (self.named or alike)
 
     def state(self) -> tuple[object, ...]:
-        """Return all values that can change, for comparison."""
+        """Return all offsets in force as one value, to detect changes."""
         return (self._turn, self.system, dict(self.origins), dict(self.rotations), self.shift, self._kept, self.tool)
 
     def machine(self, place: Point) -> Point:
@@ -117,12 +117,12 @@ class Offsets:
         return (x - self.shift[0], y - self.shift[1], z - self.shift[2])
 
     def turn(self, centre: tuple[float, float] | None, angle: float = 0.0) -> None:
-        """Run G68: rotate X and Y of the program about a point in program coordinates [mm, deg]; None: G69."""
+        """Execute G68: rotate X and Y of the program about a point in program coordinates [mm, deg]; None: G69."""
         self._turn = None if centre is None else (centre[0] + self.shift[0], centre[1] + self.shift[1], angle)
         self._update()
 
     def select(self, system: int) -> Known:
-        """Run G54 and similar codes; return, per axis, whether a known program coordinate remains known."""
+        """Execute G54 and similar codes; return, per axis, whether a known program coordinate remains known."""
         if system == self.system and self.named:
             return _ALL
         before, turned = self._certain_origins.get(self.system, _NEVER), self.rotation
@@ -135,7 +135,7 @@ class Offsets:
     def set_origin(
         self, system: int, values: Mapping[int, float], rotation: float | None = None, add: bool = False
     ) -> None:
-        """Run G10 L2: set the origin of a system.
+        """Execute G10 L2: set the origin of a system.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Offsets:
         self._update()
 
     def name_origin(self, system: int, point: Point, values: Mapping[int, float], known: Known) -> None:
-        """Run G10 L20: set the origin of a system so that a machine point has the given program coordinates in it.
+        """Execute G10 L20: set the origin of a system so that a machine point has the given program coordinates in it.
 
         Parameters
         ----------
@@ -182,20 +182,20 @@ class Offsets:
         self._update()
 
     def name_place(self, place: Point, values: Mapping[int, float], known: Known) -> None:
-        """Run G92: shift the coordinates so that a point in program coordinates has the given coordinates."""
+        """Execute G92: shift the coordinates so that a point in program coordinates has the given coordinates."""
         told = combine_known(self._certain_shift, known)
         self._certain_shift = mark_axes(self._certain_shift, {i: v for i, v in values.items() if not told[i]}, to=False)
         self._set_shift(replace_coordinates(self.shift, {i: self.shift[i] + place[i] - v for i, v in values.items()}))
 
     def set_shift(self, values: Mapping[int, float]) -> Known:
-        """Run G52; return, per axis, whether a known program coordinate remains known."""
+        """Execute G52; return, per axis, whether a known program coordinate remains known."""
         still = triple(c or i not in values for i, c in enumerate(self._certain_shift))
         self._certain_shift = mark_axes(self._certain_shift, values, to=True)
         self._set_shift(replace_coordinates(self.shift, values))
         return still
 
     def drop_shift(self, keep: bool) -> Known:
-        """Run G92.1, or G92.2, which keeps the values for G92.3; return whether program coordinates remain known."""
+        """Execute G92.1, or G92.2, which keeps the values for G92.3; return whether program coordinates stay known."""
         kept, still = self._kept, self._certain_shift
         self._set_shift(_ZERO)
         self._kept = kept if keep else _ZERO
@@ -203,7 +203,7 @@ class Offsets:
         return still
 
     def restore_shift(self) -> Known:
-        """Run G92.3; return that program coordinates are no longer known."""
+        """Execute G92.3; return, per axis, that program coordinates are no longer known."""
         self._set_shift(self._kept)
         self._certain_shift = _NEVER
         return _NEVER
@@ -213,7 +213,7 @@ class Offsets:
         self._update()
 
     def set_tool(self, tool: Point, certain: Known) -> Known:
-        """Run G43 and similar codes; return, per axis, whether a known program coordinate remains known."""
+        """Execute G43 and similar codes; return, per axis, whether a known program coordinate remains known."""
         still = combine_known(self.certain_tool, certain)
         self.tool, self.certain_tool = tool, certain
         self._update()

@@ -72,7 +72,7 @@ _CALL = "is read by LinuxCNC from separate files, and by a Fanuc from its memory
 
 
 class OpenWord(NamedTuple):
-    """Word with two interpretations."""
+    """A word that LinuxCNC and Fanuc controls interpret differently."""
 
     kind: str
     text: str

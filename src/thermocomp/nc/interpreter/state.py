@@ -61,7 +61,7 @@ class InterpreterState:
         return self.turning * (self.spindle or 0.0)
 
     def changed(self, **fields: object) -> None:
-        """Change fields of the modal state."""
+        """Set fields of the modal state to new values."""
         modal = replace(self.modal, **fields)  # type: ignore[arg-type]
         if modal != self.modal:
             self.modal = modal
@@ -92,7 +92,7 @@ class InterpreterState:
         )
 
     def axis_values(self, words: BlockWords) -> dict[int, float]:
-        """Return X Y Z of the line by axis [mm]; X as a radius."""
+        """Return the values of the words X, Y and Z of a line, by axis [mm]; X as a radius."""
         values, scale = words.values, self.scale
         found = {i: values[letter] * scale for i, letter in enumerate("XYZ") if letter in values}
         if self.modal.diameter and 0 in found:
@@ -141,7 +141,7 @@ class InterpreterState:
         return way
 
     def reach(self, place: Point, known: Known) -> None:
-        """Set the position, in program coordinates."""
+        """Set the tool position, in program coordinates, and which of its axes are known."""
         self.place, self.known = place, known
         self.machine = self.offsets.machine(place)
 

@@ -33,7 +33,7 @@ class BlockWords:
     values: dict[str, float]
 
     def error(self, reason: str) -> ProgramError:
-        """Return an error for this line."""
+        """Return a `ProgramError` with the number of this line."""
         return self.line.fault(reason)
 
     def whole(self, letter: str, least: int = 0) -> int | None:

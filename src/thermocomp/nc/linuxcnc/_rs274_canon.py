@@ -75,7 +75,7 @@ class Canon:
         self.flushed = 0
 
     def begin(self, job: dict[str, Any]) -> None:
-        """Set the context in which the program runs."""
+        """Set the program to be run, its tools, and the limits on its execution."""
         self.parameter_file = job["parameters"]  # read by the module
         self.delete = bool(job["block_delete"])
         self.tools: list[tuple[int, float, float]] = job["tools"]  # number, length, diameter
@@ -170,7 +170,7 @@ class Canon:
         self.extra(kind, re.sub("[^ -~]", "?", text))
 
     def extra(self, kind: str, what: Any) -> None:
-        """Record data other than a row of numbers."""
+        """Record non-numeric data, such as a text or the points of a curve."""
         self.more.append(what)
         self.record(kind, len(self.more) - 1)
 
@@ -234,7 +234,7 @@ class Canon:
         self.tell("tooltable")
 
     def opened(self, name: bytes, mode: bytes) -> int:
-        """Record a file that exists, including the program itself."""
+        """Record the name of a file that the interpreter opens, including the program itself."""
         self.reading.check_file(name, write=not mode.startswith(b"r"))
         result: int = self.open_before(name, mode)
         if result and mode.startswith(b"r"):

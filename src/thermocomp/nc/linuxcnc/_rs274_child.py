@@ -37,7 +37,7 @@ canonical = load_sibling("_rs274_canon")  # uses the others
 
 
 def run(job: dict[str, Any], canon: Any, gcode: Any) -> None:
-    """Run a job."""
+    """Run a job, and write its canonical calls to standard output."""
     ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG: end with the parent process
     resource.setrlimit(resource.RLIMIT_CPU, (job["seconds"], job["seconds"] + 1))
     os.environ["HOME"] = job["home"]

@@ -103,7 +103,7 @@ class ProgramReading:
         )
 
     def look_at_time(self) -> None:
-        """Update the time since the last axis motion."""
+        """Note whether too much processor time has passed without motion of an axis."""
         now = time.process_time()
         if self.moved > self.looked:
             self.since = now

@@ -26,7 +26,7 @@ class Ini:
     sections: dict[str, dict[str, list[str]]]
 
     def get(self, section: str, key: str, default: str | None = None) -> str:
-        """Return a value."""
+        """Return the value of a key in a section of the INI file."""
         found = self.sections.get(section, {}).get(key)
         if found:
             return found[0]
@@ -35,7 +35,7 @@ class Ini:
         return default
 
     def number(self, section: str, key: str, default: float | None = None) -> float:
-        """Return a numeric value."""
+        """Return the numeric value of a key in a section of the INI file."""
         text = self.get(section, key, None if default is None else str(default))
         try:
             found = float(text)

@@ -42,7 +42,7 @@ class ArcPath(NamedTuple):
 
 
 class Canonical(NamedTuple):
-    """One canonical call.
+    """One canonical call of the interpreter.
 
     `kind` is ``rapid``, ``feed``, ``arc``, ``probe``, ``tap``, ``curve`` for moves, else ``dwell`` (s),
     ``feedrate`` (F converted to mm, F as programmed), ``feedmode`` (spindle, 1 for G95), ``unit`` (mm per unit of
@@ -91,7 +91,7 @@ class ProgramFrame:
         self._sum = None if self.rotation else _nine(f + s for f, s in zip(self._fixed, self.shift, strict=True))
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Apply a canonical call; ignore calls of other kinds."""
+        """Update the offsets by a canonical call; calls of other kinds have no effect."""
         if kind == "g5x":
             self.system, self.origin = int(values[0]), _nine(values[1:])
         elif kind == "g92":

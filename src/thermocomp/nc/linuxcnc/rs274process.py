@@ -91,7 +91,7 @@ class Stored:
     system: int = 1
 
     def numbers(self) -> dict[int, float]:
-        """Return all parameters as stored in the controller."""
+        """Return the state as numbered parameters (#5161 and so on), as the controller stores it."""
         result = dict(self.parameters)
         result |= {5161 + i: value for i, value in enumerate(self.home28)}
         result |= {5181 + i: value for i, value in enumerate(self.home30)}
@@ -106,7 +106,7 @@ class Stored:
 
 @lru_cache(64)
 def draw_controller(seed: int, startup: str = "") -> Stored:
-    """Return a random controller; different seeds share only the codes in `startup`.
+    """Return a random controller state; states of different seeds share only the codes in `startup`.
 
     Returns
     -------

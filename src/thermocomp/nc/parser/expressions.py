@@ -59,7 +59,7 @@ class Parameters:
         raise InputError(f"{_written(key)} is unknown: {self._lost.get(key) or explain_unset(key, self.controller)}")
 
     def assign(self, assignments: Iterable[Assignment]) -> None:
-        """Run the assignments of one line; all use the values before the line, as in LinuxCNC."""
+        """Execute the assignments of one line; all use the values before the line, as in LinuxCNC."""
         known: dict[Key, float] = {}
         for target, value, _, _ in assignments:
             key = self.key(target)
@@ -204,7 +204,7 @@ class _Reader:
         raise self.error("a number, a parameter, a function or '['")
 
     def parameter(self) -> Key:
-        """Read the key after ``#``."""
+        """Read the number or name of a parameter after ``#``."""
         marks = 0
         while self.takes("#"):
             marks += 1

@@ -66,5 +66,5 @@ class Line:
     error: str = ""
 
     def fault(self, reason: str) -> ProgramError:
-        """Return an error for this line."""
+        """Return a `ProgramError` with the number of this line."""
         return ProgramError(self.number, reason)

@@ -138,7 +138,7 @@ def _read_squeezed(text: str, columns: Sequence[int], controller: Controller, li
 
 
 def _check_control(text: str, place: int) -> None:
-    """Check the text after the name of an O-word."""
+    """Raise a syntax error if the text after the name of an O-word is invalid."""
     found = _CONTROL.match(text, place)
     if found is None:
         raise _NotUnderstoodError(place, "an O-word needs sub, call, if, while, repeat ... after its number or name")
@@ -205,7 +205,7 @@ def _complaint(text: str, place: int) -> str:
 
 
 def _value(text: str, place: int, letter: str, controller: Controller) -> int:
-    """Return the end of a value."""
+    """Return the position after the value that starts at a given position."""
     begin = place
     while text[place : place + 1] in {"+", "-"} and (controller == "linuxcnc" or place == begin):
         place += 1  # LinuxCNC reads X--5 as X5
@@ -226,7 +226,7 @@ def _value(text: str, place: int, letter: str, controller: Controller) -> int:
 
 
 def _parameter(text: str, place: int) -> int:
-    """Return the end of a parameter that starts at this position."""
+    """Return the position after the parameter that starts at a given position."""
     while text.startswith("#", place):
         place += 1
     if found := _NAME.match(text, place) or re.compile("[0-9]+").match(text, place):

@@ -65,7 +65,7 @@ class Corners:
         return self._around(before, after, tolerance, speed * KINK / kink)
 
     def _around(self, before: Segment, after: Segment, tolerance: float, kinked: float) -> Segment | None:
-        """Insert an arc in a corner, or use a faster transition."""
+        """Insert an arc in the corner between two moves, or use a faster transition."""
         u, w = before.leave, after.entry
         dot = max(-1.0, min(1.0, u[0] * w[0] + u[1] * w[1] + u[2] * w[2]))
         turn = math.acos(dot)
@@ -183,7 +183,7 @@ def _altitude(before: Segment, after: Segment, dot: float, turn: float) -> float
 
 
 class Straight:
-    """Corner of two lines."""
+    """Corner between two straight lines."""
 
     def __init__(self, before: Segment, after: Segment, turn: float) -> None:
         self.half = (math.pi - turn) / 2.0
@@ -271,7 +271,7 @@ def _angle(v: complex, w: complex) -> float:
 
 
 def _on_line(point: complex, along: complex, centre: complex, distance: float) -> list[complex]:
-    """Return the points on a line at a distance from a centre."""
+    """Return the points of a line at a given distance from a centre."""
     foot = ((centre - point) * along.conjugate()).real
     off = distance**2 - abs(point + foot * along - centre) ** 2
     return [point + (foot + s * math.sqrt(off)) * along for s in (-1.0, 1.0)] if off >= 0.0 else []

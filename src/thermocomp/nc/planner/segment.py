@@ -149,7 +149,7 @@ class Segments:
         )
 
     def _asked(self, move: Move, length: float, block: Block) -> float:
-        """Return the programmed speed [mm/s]."""
+        """Return the programmed speed of a move [mm/s]."""
         speed = length / move.seconds if move.seconds else move.feed / 60.0
         if not speed > 0.0:
             raise block.error("a feed move, but no feed is in force: write F before it")

@@ -86,7 +86,7 @@ class MotionLimits:
 
     @classmethod
     def of(cls, machine: Machine, **others: float) -> "MotionLimits":
-        """Return the limits from a machine file."""
+        """Return the motion limits of a machine, with defaults for values that its file does not give."""
         axes = {a.name: a for a in machine.axes}
 
         def told(key: str, otherwise: float) -> Vector:
@@ -121,7 +121,7 @@ def time_blocks(blocks: Iterable[Block], kinematics: MotionLimits) -> Iterator[T
 
 
 class _Plan:
-    """Planned moves of the controller, and completed blocks."""
+    """Motion planner: moves that are planned but not yet timed, and completed blocks."""
 
     def __init__(self, kinematics: MotionLimits) -> None:
         self.kinematics = kinematics
@@ -146,7 +146,7 @@ class _Plan:
         self.done: list[Timed] = []
 
     def add(self, serial: int, block: Block) -> None:
-        """Add a block."""
+        """Plan the moves and pauses of the next block."""
         kinematics, codes = self.kinematics, block.codes
         before = 0.0
         halts = "S" in block.words
@@ -176,7 +176,7 @@ class _Plan:
             self.halt(after)
 
     def halt(self, pause: float) -> None:
-        """Stop, and wait for a pause [s]."""
+        """Bring the axes to a stop, and wait for the duration of a pause [s]."""
         self._unchain()
         if self.last is not None:
             self._push(self.last, self.tolerance is not None)
@@ -197,7 +197,7 @@ class _Plan:
         self.chained = (serial, move, block)
 
     def _near(self, end: Point) -> bool:
-        """Return whether a line to this end passes close to all points of the chain."""
+        """Return whether a straight line to this end passes close to all points that it would replace."""
         chain, most = self.chain, self.straight * self.straight
         if len(chain) > CHAIN:
             return False
@@ -215,19 +215,19 @@ class _Plan:
         return True
 
     def _unchain(self) -> None:
-        """Add the line that replaces the chain."""
+        """Plan the single line that replaces the chained feed lines."""
         if self.chained is not None:
             serial, move, block = self.chained
             self.chained = None
             self._join(serial, Move(rapid=False, start=self.chain[0], end=move.end, feed=move.feed), block)
 
     def _finish(self) -> None:
-        """Complete the first waiting block."""
+        """Assign start and end time to the first block that waits for them."""
         self.done.append(Timed(self.waiting.popleft()[1], self.since, self.now))
         self.since = self.now
 
     def _join(self, serial: int, move: Move, block: Block) -> None:
-        """Append the segment of a move, joined to the last one."""
+        """Append the segment of a move, with a corner transition from the last one."""
         segment = self.segments.of(serial, move, block)
         if segment is None:
             return
@@ -249,7 +249,7 @@ class _Plan:
             self._run(CHUNK)
 
     def _run(self, count: int) -> None:
-        """Time a number of segments, from the first one on."""
+        """Compute the duration of a number of segments, from the first one on."""
         ahead, cycle = self.ahead, self.kinematics.cycle
         squares = self._leaving()
         sqrt = math.sqrt

@@ -58,7 +58,7 @@ def draw(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title
 
 
 def render(run: Run, bounds: Sequence[Bound], tool_changes: Sequence[float], title: str) -> bytes:
-    """Return the figure as PNG."""
+    """Return the figure of a revised program as PNG."""
     return png(draw(run, bounds, tool_changes, title))
 
 

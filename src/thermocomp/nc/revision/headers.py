@@ -37,14 +37,14 @@ def told_taken(taken: Sequence[str]) -> list[str]:
 
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
-    """Return the error bounds of the tool in the cuts."""
+    """Return the line about the error bounds of the tool position in the cuts."""
     return "bound " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:
-    """Return the description of the proof, including the controller states, in a given number of lines."""
+    """Return the description of the verification, including the controller states, in a given number of lines."""
     return [UNPROVED] if proof is None else wrap_text(f"proved {proof.sentence}", lines)
 
 

@@ -24,7 +24,7 @@ from thermocomp.nc.rewrite.offset import ending
 from thermocomp.nc.rewrite.revise import Revised, Revision
 from thermocomp.nc.thermal.drift import Drift
 
-#: remedy in the error for a program that cannot be proved
+#: remedy in the error for a program that cannot be verified
 ALL_THE_SAME = "--unproved writes it anyway, and its header states this"
 #: names of the draft program and diff, whose header is still blank
 PROGRAM, DIFF = "program", "diff"
@@ -41,7 +41,7 @@ Phase = Callable[[str], AbstractContextManager[Tell]]
 
 
 class Paths(NamedTuple):
-    """Output files, by content."""
+    """Paths of the output files, by content."""
 
     program: Path
     diff: Path
@@ -113,14 +113,14 @@ class Job:
 
 
 class Done(NamedTuple):
-    """Result of a job."""
+    """Result of the revision of a program."""
 
     run: Run
     bounds: tuple[Bound, ...]
     written: bool  #: False: nothing was corrected, and no files were written
     proof: Proof | None  #: None: not verified by the interpreter
     seconds: float  #: duration of the revision
-    proving: float  #: duration of the proof
+    proving: float  #: duration of the verification
 
 
 def revise(job: Job, phase: Phase) -> Done:
@@ -282,7 +282,7 @@ def _bounds(job: Job, run: Run) -> tuple[Bound, ...]:
 
 
 def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
-    """Return the texts of the header."""
+    """Return the texts for the header of the revised program."""
     place = headers.describe_place(job.revision, job.drift.axes) if job.drift.by_position else []
     facts = [
         f"thermocomp {__version__}, {job.when.date()}, for {job.revision.setup.controller}",
@@ -300,7 +300,7 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
 
 
 def _proved(job: Job, original: Path, revised: Path, ledger: Ledger, tell: Tell) -> Proof:
-    """Return the proof by the interpreter."""
+    """Return the result of the verification by the interpreter."""
     lines, last = max(job.revision.lines, 1), 0
 
     def progress(line: int) -> None:

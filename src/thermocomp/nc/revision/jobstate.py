@@ -36,7 +36,7 @@ def dumps(state: JobState, written: datetime) -> str:
 
 
 def loads(text: str, source: str = "state of a job") -> SavedJob:
-    """Read the text of a state file."""
+    """Return the state at the end of a job from the text of its file."""
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
         raise ModelFileError(f"{source}: contains the states of {len(jobs)} jobs; expected one")
@@ -45,10 +45,10 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
 
 
 def write(state: JobState, written: datetime, path: str | Path, *, overwrite: bool = False) -> None:
-    """Write the state at the end of a job."""
+    """Write the state at the end of a job to a file."""
     jsonfile.write(dumps(state, written), path, overwrite=overwrite)
 
 
 def read(path: str | Path) -> SavedJob:
-    """Read the state at the end of a job."""
+    """Return the state at the end of a job from a file."""
     return loads(*jsonfile.read(KIND, path))

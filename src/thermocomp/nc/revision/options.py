@@ -80,7 +80,7 @@ class Way:
         return Demand(tolerance, every, read_value(self.largest, "displacement", "--largest", "400 um", positive=True))
 
     def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
-        """Return the method of correction."""
+        """Return the correction method with its settings."""
         digits, step = DIGITS[setup.controller], read_value(self.step, "displacement", "--step", "1 um", positive=True)
         safe = None if self.safe_z is None else read_value(self.safe_z, "position", "--safe-z", "5 mm")
         if self.method == "coordinates":
@@ -104,7 +104,7 @@ class Way:
         return folders
 
     def words(self) -> str:
-        """Return the method as text."""
+        """Return the method of correction as text, for the header."""
         often = f"every {self.every}" if self.every else f"by {self.tolerance}"
         return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
 
@@ -224,7 +224,7 @@ class Timing:
     stop: str = "60 s"
 
     def read(self) -> Machine | None:
-        """Return the machine, if a machine file is given."""
+        """Return the machine in the machine file; None without one."""
         return None if self.machine is None else read_machine(self.machine)
 
     def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:

@@ -1,4 +1,4 @@
-"""Results of a revision: warnings and numbers."""
+"""Results of the revision of an NC program: warnings and numbers."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from thermocomp.nc.thermal.inputs import SPEED
 
 
 def warnings(job: Job, done: Done) -> list[str]:
-    """Return the reasons why the result may be worse than its bound."""
+    """Return warnings: reasons why the error of the tool may exceed its reported bound."""
     drift, revision = job.drift, job.revision
     found = list(drift.assumed)
     found += [

@@ -57,7 +57,7 @@ class Drifting:
     accept_unproven: str | None = None
 
     def stations(self) -> list[Station]:
-        """Return the model of each axis."""
+        """Return the models with the axes, and the positions, for which they are valid."""
         models = [m.taken(self.accept_unproven) for path in self.model for m in modelfile.read(path)]
         return stations(models, self.axis or ())
 
@@ -170,7 +170,7 @@ class Starting:
         return self.zero or ("start" if self.cold else "cold" if self.carried is None else "last")
 
     def words(self) -> str:
-        """Return the start state as text."""
+        """Return the initial thermal state as text, for the header."""
         if self.carried is not None:
             name = self.carried.name
             return f"{self.pause} after {name}" if self.pause else f"as {name} left it"

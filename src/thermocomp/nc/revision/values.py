@@ -63,7 +63,7 @@ def _system(name: str, said: str, example: str) -> int:
 
 
 def point_of(text: str, said: str) -> Point:
-    """Return a point [mm]."""
+    """Return the point in a text with three lengths [mm]."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3:
         raise InputError(f"{said}: expected X, Y and Z, such as 100 mm, 50 mm, 0 mm")

@@ -32,7 +32,7 @@ class Check:
             yield self._texts.popleft()
 
     def check(self, block: Block, change: Change) -> None:
-        """Compare a block with its revision."""
+        """Compare a block of the original with its revised lines; raise an error if the moves differ."""
         longest = max(map(len, change.texts))
         if longest > (most := max(LONGEST, len(block.line.text))):
             raise block.error(f"would become a line of {longest} characters; at most {most} are allowed; divide it")

@@ -34,7 +34,7 @@ class Contact:
     _length: float = field(default=0.0, init=False)
 
     def begin(self, block: Block) -> None:
-        """Start a block, before `most` is called."""
+        """Update the contact state at the start of a block, before `most` is called."""
         if block.tool_change is not None:
             self._leave()
         self._length = sum(map(length, block.moves))

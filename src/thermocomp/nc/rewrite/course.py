@@ -45,13 +45,13 @@ class Bound(NamedTuple):
 
     @property
     def most(self) -> float:
-        """Return the bound; nan if there is none."""
+        """Return the bound of the error; nan if the models were never judged."""
         return self.left + self.model
 
 
 @dataclass
 class Course:
-    """Recorder of a run.
+    """Recorder of drift, correction and spindle speed over the run of a program.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Course:
     _stride: int = field(default=1, init=False)  # rows per interval
 
     def take(self, revised: Revised) -> None:
-        """Add a line, in order."""
+        """Take the results of the next line of the program."""
         block = revised.block
         if block is None:
             return
@@ -97,7 +97,7 @@ class Course:
             self._join()
 
     def run(self) -> Run:
-        """Return the run so far."""
+        """Return the recorded run up to the last line taken."""
         table = np.array([self._low, self._high], dtype=np.float64).reshape(2, -1, 10).swapaxes(0, 1)
         return Run(
             time=np.array(self._times, dtype=np.float64),
@@ -140,7 +140,7 @@ class Travel:
     _farthest: dict[str, tuple[float, float, int]] = field(default_factory=dict, init=False)  # beyond, position, line
 
     def take(self, revised: Revised) -> None:
-        """Add a line, in order."""
+        """Take the results of the next line of the program."""
         block = revised.block
         if block is None:
             return

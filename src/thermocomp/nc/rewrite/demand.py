@@ -22,7 +22,7 @@ Field = Callable[[Point], Vector]
 
 
 class DriftSource(Protocol):
-    """Interface of a machine's drift."""
+    """Interface of the predicted drift of a machine over the time of a program."""
 
     @property
     def by_position(self) -> bool:
@@ -131,7 +131,7 @@ class Left:
     without: list[float] = field(default_factory=lambda: [0.0] * 3)
 
     def take(self, line: int, samples: Iterable[tuple[Vector, Vector]]) -> CutErrors:
-        """Add a cut.
+        """Add the samples of a cut; return its errors.
 
         Parameters
         ----------

@@ -21,12 +21,12 @@ _TOLD = str.maketrans("()%;", "[]_,")
 
 
 def make_blank(ending: str, lines: int = LINES) -> tuple[str, ...]:
-    """Return a blank header."""
+    """Return a header of empty comment lines, to be filled in later."""
     return tuple(f"({MARK} {k}){ending}" for k in range(lines))
 
 
 def fill(facts: Sequence[str], ending: str, lines: int = LINES, *, upper: bool = False) -> tuple[str, ...]:
-    """Return the header."""
+    """Return the header with its texts filled in."""
     said = ["REVISED FOR THERMAL DRIFT: DO NOT REVISE AGAIN", *facts]
     said += ["-"] * (lines - len(said))
     texts = (clean_comment(text)[:ROOM] for text in said[:lines])

@@ -15,7 +15,7 @@ class SpindleState:
     _told: bool = False
 
     def speed(self, block: Block) -> float:
-        """Return the speed in a block [1/min]."""
+        """Return the spindle speed in a block [1/min]."""
         if not self._told:
             self._told = any(code in ("M3", "M4", "M5") for code in block.codes)
             if not self._told and self.setup.speed:

@@ -15,7 +15,7 @@ STILL = 1e-7
 
 
 class Change(NamedTuple):
-    """Result of revising a block."""
+    """Revised lines of a block, and the corrections before and after it."""
 
     texts: tuple[str, ...]  #: lines that replace the line; the last one is the line itself
     before: Vector  #: correction of the axes at the start of the block [um, machine axes]

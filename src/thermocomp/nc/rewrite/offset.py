@@ -194,5 +194,5 @@ class Offset(CorrectionMethod):
 
 
 def ending(text: str) -> str:
-    """Return the line ending of a text."""
+    """Return the line ending of a program line."""
     return text[len(text.rstrip("\r\n")) :] or "\n"

@@ -29,13 +29,14 @@ from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split
 from thermocomp.nc.rewrite.text import Vector
 
 MOST_PIECES = 1000
-#: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as held
+#: the drift continues within a line: a residual up to this multiple of the tolerance is not reported as caused by a
+#: held correction
 TELLING = 1.1
 _PLAIN = frozenset(("G0", "G1"))
 
 
 class Revised(NamedTuple):
-    """Original line with its revision."""
+    """Original line of a program with its revised lines."""
 
     number: int  #: number of the original line; 0 for the header
     text: str  #: the original line; empty for the header
@@ -54,7 +55,7 @@ class Revised(NamedTuple):
 
 @dataclass
 class Revision:
-    """Revision of one program.
+    """Revision of one program, block by block.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ class Revision:
             yield block
 
     def revise(self, texts: Iterable[str]) -> Iterator[Revised]:
-        """Revise a program."""
+        """Yield each line of a program with its revised lines."""
         check = Check(self.setup)
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
@@ -212,7 +213,7 @@ class Revision:
         return cut
 
     def _read(self, texts: Iterable[str]) -> Iterator[Line]:
-        """Yield the lines of a program that has not been revised before."""
+        """Yield the parsed lines of a program; raise `ProgramError` if it has been revised before."""
         for line in read_lines(recognised(texts), self.setup.controller):
             if line.comment:
                 header.refuse_revised(line)
@@ -232,7 +233,7 @@ class Revision:
         )
 
     def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return the change of a block, and the corrections along its path."""
+        """Return the revised lines of a block, and the corrections along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]

@@ -28,7 +28,7 @@ _BESIDE: Final = frozenset(
 
 
 class Sample(NamedTuple):
-    """Sampled position in a block."""
+    """Deviation at a position in a block, and the correction that it requires."""
 
     share: float  #: fraction of the path
     deviation: Vector  #: deviation of the tool point [um]
@@ -140,7 +140,7 @@ def pieces(block: Block, parts: Sequence[float], before: Known, controller: Cont
 
 
 def _words(block: Block) -> list[int]:
-    """Return the axes that have a word in every piece."""
+    """Return the axes that have a word in every piece of a split block."""
     arc = block.moves[0].arc
     plane = () if arc is None else PLANES[arc.plane][:2]
     return [i for i, letter in enumerate(AXES) if letter in block.words or i in plane]

@@ -33,7 +33,7 @@ class Digits:
     inch: int = 6
 
     def of(self, inch: bool) -> int:
-        """Return the decimals in the unit in force."""
+        """Return the number of decimals for the unit in force."""
         return self.inch if inch else self.mm
 
 
@@ -62,7 +62,7 @@ class Frame:
 
     @classmethod
     def of(cls, modal: Modal, digits: Digits) -> "Frame":
-        """Return the frame of a modal state."""
+        """Return the conversion for a modal state."""
         unit = _MM / 25.4 if modal.inch else _MM
         turned = math.radians(modal.rotation)
         scale = (2 * unit if modal.diameter else unit, unit, unit)

@@ -1,6 +1,6 @@
 """Drift along a program: frozen models in free run, driven by its spindle speed (P-05, P-06).
 
-Program time advances in steps as short as a move; the models are stepped on a coarser clock: at least every
+Program time advances in steps as short as a move; the models are stepped at longer intervals: at least every
 `Drift.step` seconds, when the spindle speed changes, and again soon after, because part of a deviation may follow the
 speed immediately. While the inputs are constant, the results of the families of `thermocomp.core` do not depend on the
 division of time into steps.
@@ -152,7 +152,7 @@ class Drift:
         self._due = min(SOON, self.step)
 
     def _flush(self) -> None:
-        """Step the models through the time since their last step."""
+        """Advance the models by the time since their last step."""
         total, speed = self._pending, self._speed
         if self._counted:
             speed = (self._turns + (total - self._counted) * speed) / total
@@ -233,7 +233,7 @@ class Drift:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Axes that have a model."""
+        """Axes whose drift has a model."""
         return tuple(a for a in AXES if any(s.axis == a for s in self.stations))
 
     @property
@@ -310,7 +310,7 @@ class Drift:
 
 @dataclass(slots=True)
 class _Ladder:
-    """Stations of one axis along another axis."""
+    """Models of the drift of one axis at several positions along an axis."""
 
     axis: int
     along: int

@@ -68,16 +68,16 @@ class InputSignal:
 
     @classmethod
     def constant(cls, value: float) -> "InputSignal":
-        """Return a constant signal."""
+        """Return a signal with the same value at all times."""
         return cls((0.0,), (value,))
 
     @property
     def varies(self) -> bool:
-        """Whether the signal is not constant."""
+        """True if the signal changes over time."""
         return len(self.time) > 1
 
     def at(self, time: float) -> float:
-        """Return the value at a time [s]."""
+        """Return the value of the signal at a time [s]."""
         return interpolate(self.time, self.values, time)
 
     def held(self, time: float) -> float:
@@ -118,7 +118,7 @@ class Wiring:
 
     @property
     def varies(self) -> bool:
-        """Whether a forecast is among the inputs."""
+        """True if an input of the model changes over time independently of the program."""
         return bool(self._varying)
 
     def values(self, time: float, speed: float) -> FloatArray:
@@ -132,7 +132,7 @@ class Wiring:
 
 
 def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, InputSignal]:
-    """Read the constants given by the user.
+    """Read the inputs to which the user assigned constant values.
 
     Parameters
     ----------

@@ -173,7 +173,7 @@ def _names(station: Station) -> list[str]:
 
 
 def _resting(model: ErrorModel, wiring: Wiring, speed: float) -> State:
-    """Return the state of a machine settled at a constant speed."""
+    """Return the model state of a machine settled at a constant spindle speed."""
     return model.step(model.init(), wiring.values(0.0, speed), 0.0)[0]
 
 

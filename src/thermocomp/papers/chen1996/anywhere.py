@@ -68,11 +68,11 @@ class Volume:
 
     @cached_property
     def sizes(self) -> dict[str, FloatArray]:
-        """Lengths of the error vectors, each of shape (n,) [um]."""
+        """Lengths of the error vectors by type of compensation, each of shape (n,) [um]."""
         return {name: np.linalg.norm(e, axis=1) for name, e in self.errors.items()}
 
     def gain(self, what: str = WITH) -> float:
-        """Return the factor by which the RMS error is reduced."""
+        """Return the factor by which a type of compensation reduces the RMS error."""
         return rms(self.sizes[WITHOUT]) / rms(self.sizes[what])
 
 
@@ -143,7 +143,7 @@ def judge(learned: LearnedVolume, seed: int) -> Volume:
 
 
 def _points(learned: LearnedVolume, test: SimulatedTest, n: int, rng: np.random.Generator) -> Iterator[tuple[Any, ...]]:
-    """Yield the fields of `_Points` for each point."""
+    """Yield the values of `_Points` for each random point."""
     model = VolumetricModel(learned.machine)
     recording = virtual.make_recording(test)
     states = model.replay(recording.time, {name: recording.table[name].to_numpy() for name in model.inputs})
@@ -279,7 +279,7 @@ def figures(found: Volume) -> list[Figure]:
 
 
 def _off(fit: PositionFit) -> float:
-    """Return the RMS error of the cold profile of EYX over the travels of X and Z [um]."""
+    """Return the RMS error of a model of the cold profile of EYX, over the travels of X and Z [um]."""
     x, z = np.meshgrid(*(np.linspace(0.0, TRAVEL[a], 31) for a in "xz"))
     points = np.stack([x.ravel(), np.full(x.size, float(TEST_POSITION["y"])), z.ravel()], axis=-1)
     assert fit.model.profile is not None

@@ -57,13 +57,13 @@ class LearnedNet:
 
     @property
     def mean(self) -> float:
-        """Mean over the three drifts [um]."""
+        """Mean absolute error after training, averaged over the three drifts [um]."""
         return float(np.mean(list(self.mae.values())))
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedDrift:
-    """Results of learning from the 810 sets.
+    """Models fitted to the 810 training rows, and their errors.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ class LearnedDrift:
 
     @property
     def mean(self) -> float:
-        """Mean error of the nets after training [um]."""
+        """Mean absolute error of the neural nets after training [um]."""
         return float(np.mean([n.mean for n in self.nets]))
 
     def mean_of(self, kind: str) -> float:
-        """Return the mean error of the nets of one of `others` after training [um]."""
+        """Return the mean absolute error of the nets of one of `others` after training [um]."""
         return float(np.mean([n.mean for n in self.others[kind]]))
 
     @cached_property
@@ -137,7 +137,7 @@ class LearnedDrift:
 
     @property
     def ranges(self) -> dict[str, float]:
-        """Range of each drift [um]."""
+        """Maximum minus minimum of each drift [um]."""
         return {t: float(np.ptp(common.take_measured(self.samples, t))) for t in DRIFTS}
 
 
@@ -254,7 +254,7 @@ def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
 
 
 def tables(found: LearnedDrift) -> list[StudyTable]:
-    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the logs of Fig. 2 and the sweep."""
+    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the training logs of Fig. 2 and the sweep."""
     sensors = [(name, setup.SENSORS.get(name, "mean of T6 to T9"), r) for name, r in screening(found).items()]
     printed = {"x": (f" ({R2_X})", f" ({SEE_X:.1f})")}
     fits = []
@@ -280,13 +280,13 @@ def _mean_errors(kind: str, nets: Sequence[LearnedNet]) -> tuple[str, Sequence[L
 
 
 def beside(ours: Mapping[str, float], paper: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Return the rows of a table of coefficients by term, ours next to those of the paper; empty if there is none."""
+    """Return the rows of a table of coefficients by term, ours next to the paper's; a missing one is empty."""
     texts = [{term: f"{coefficient:.3f}" for term, coefficient in c.items()} for c in (ours, paper)]
     return [(term, texts[0].get(term, ""), texts[1].get(term, "")) for term in {**ours, **paper}]
 
 
 def figures(found: LearnedDrift) -> list[Figure]:
-    """Return Figs. 3 to 5 and 10 to 12: measurements and fits."""
+    """Return the figures that correspond to Figs. 3 to 5 and 10 to 12: measurements and fits."""
     samples, drawn = found.samples, []
     for kind, first, models in (("MRA", 3, found.models), ("net", 10, found.typical.models)):
         for number, (target, model) in enumerate(models.items(), start=first):

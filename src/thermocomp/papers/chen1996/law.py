@@ -75,11 +75,11 @@ class Design:
 
     @property
     def method(self) -> SecondOrderRegression:
-        """Chen's regression."""
+        """Chen's second-order regression with the variables of the slope."""
         return SecondOrderRegression(differences=setup.DIFFERENCES, subset=SLOPE_VARIABLES, hierarchy=self.hierarchy)
 
     def reference(self, n_states: int) -> list[int]:
-        """Return the states of a test whose mean is the reference."""
+        """Return the indices of the thermal states of a test whose mean is the reference."""
         return list(range(n_states)) if self.centred else [0]
 
 
@@ -131,7 +131,7 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Recovery of the law over many draws.
+    """Recovery of the known law over many draws of the noise.
 
     Parameters
     ----------
@@ -144,17 +144,17 @@ class Recovery:
 
     @property
     def whole(self) -> float:
-        """Share of the draws with exactly the terms of Eq. 8."""
+        """Share of the noise draws in which exactly the terms of Eq. 8 are selected."""
         return float(np.mean([f.keys() == EQ8.keys() for f in self.found]))
 
     @property
     def missing(self) -> float:
-        """Share of the draws in which a term of Eq. 8 is missing."""
+        """Share of the noise draws in which a term of Eq. 8 is not selected."""
         return float(np.mean([bool(EQ8.keys() - f.keys()) for f in self.found]))
 
     @property
     def wrong(self) -> float:
-        """Share of the draws with a term that is not in Eq. 8."""
+        """Share of the noise draws in which a term is selected that is not in Eq. 8."""
         return float(np.mean([bool(f.keys() - EQ8.keys()) for f in self.found]))
 
     @property
@@ -205,7 +205,7 @@ def slope(change: FloatArray) -> FloatArray:
 
 
 def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, seed: int) -> Recovery:
-    """Return the recovery of the law over many draws."""
+    """Return how often the known law is recovered over many draws of the noise."""
     rng = np.random.default_rng(seed)
     found = []
     for draw in range(n_draws):

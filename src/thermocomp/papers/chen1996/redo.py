@@ -12,7 +12,7 @@ TITLE = "J. S. Chen, J. Yuan, J. Ni (1996): Thermal Error Modelling for Real-Tim
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study."""
+    """Reproduce Chen's study, and return its claims, tables and figures."""
     new, first_laser, second_laser, first_week, second_week = ((seed + 1) * 1000 + k for k in range(5))
     progress(0.0, "five tests, regressions and nets")
     learned = drift.learn(seed, lambda share: progress(0.5 * share, "nets"))

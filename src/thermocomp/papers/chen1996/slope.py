@@ -64,7 +64,7 @@ class LearnedPositioning:
 
     @cached_property
     def net_r2(self) -> FloatArray:
-        """R2 about zero of the nets, shape (n_starts,)."""
+        """Uncentred R2 of each neural net, shape (n_starts,)."""
         return np.array([r2_about_zero(self.k1, n.trained[0].estimator.predict(n.samples.frame())) for n in self.nets])
 
     def geometric(self, day: Profiles) -> FloatArray:
@@ -88,17 +88,17 @@ class LearnedPositioning:
 
     @property
     def other_slopes(self) -> float:
-        """RMS of the slope on the other day [um/m]."""
+        """RMS of the slope k1 on the day not used for training [um/m]."""
         return rms(self.slope(self.other))
 
     @cached_property
     def elsewhere(self) -> dict[str, float]:
-        """RMS residuals of the slope on the other day, by method [um/m]."""
+        """RMS residuals of the slope k1 on the day not used for training, by method [um/m]."""
         return {m: self.left(fit) for m, fit in self.fits.items()}
 
     @property
     def k1(self) -> FloatArray:
-        """Slope on the training day [um/m]."""
+        """Slope k1 of each profile on the day used for training [um/m]."""
         return self.slope(self.learned)
 
 
@@ -243,7 +243,7 @@ def tables(found: LearnedPositioning) -> list[StudyTable]:
 
 
 def figures(found: LearnedPositioning) -> list[Figure]:
-    """Return Figs. 1, 6, 7 and 13."""
+    """Return the figures that correspond to Figs. 1, 6, 7 and 13 of the paper."""
     learned, k1 = found.learned, found.k1
     hours = learned.states.time / 3600.0
     peak = int(np.abs(k1).argmax())

@@ -45,7 +45,7 @@ class Unseen:
 
     @property
     def models(self) -> dict[str, Mapping[str, ErrorModel]]:
-        """Models by method; for the nets the typical one."""
+        """Models by method; for the neural nets, the one with the median error."""
         return {MRA: self.learned.models, NET: self.learned.typical.models, DYNAMIC: self.dynamic}
 
     @cached_property
@@ -61,11 +61,11 @@ class Unseen:
         ]
 
     def errors(self, test: int, target: str, method: str) -> Errors:
-        """Return the error figures of a method in a test."""
+        """Return the error metrics of a method in a test."""
         return Errors.of(self.residuals[test][target][method])
 
     def nets(self, target: str, samples: Samples) -> FloatArray:
-        """Return the RMS residual of each net, shape (n_starts,) [um]."""
+        """Return the RMS residual of each neural net, shape (n_starts,) [um]."""
         return np.array([rms(n.models[target], samples) for n in self.learned.nets])
 
     def left(self, target: str, samples: Samples) -> dict[str, float]:
@@ -80,17 +80,17 @@ class Unseen:
 
     @cached_property
     def noisy(self) -> dict[str, float]:
-        """Result of `noise` for uniform noise."""
+        """RMS residual of each method for z at 1250 1/min with uniform sensor noise [um]."""
         return noise(self, "uniform")
 
 
 def rms(model: ErrorModel, samples: Samples) -> float:
-    """Return the RMS residual of a model [um]."""
+    """Return the RMS residual of a model in a test [um]."""
     return Errors.of(common.residual(model, samples)).rms
 
 
 def observe(learned: LearnedDrift, seed: int) -> Unseen:
-    """Run the two tests and train our own method."""
+    """Run the two tests not used for training, and train `dynamic` for comparison."""
     ours = {t: trained("dynamic", learned.samples, k) for k, t in enumerate(DRIFTS)}
     return Unseen([drift_samples([test]) for test in recordings("chen1996-new", seed)], learned, ours)
 
@@ -247,7 +247,7 @@ def tables(found: Unseen) -> list[StudyTable]:
 
 
 def figures(found: Unseen) -> list[Figure]:
-    """Return Figs. 14 to 17."""
+    """Return the figures that correspond to Figs. 14 to 17 of the paper."""
     constant, random = found.tests
     noisy = common.with_noise(constant, NOISE, "uniform", 0)
     shown = {14: ("z", constant), 15: ("z", random), 16: ("z", noisy), 17: ("x", found.cut)}

@@ -18,7 +18,7 @@ TITLE = "Hwang, Lee, Yang: Optimal variable selection in a thermal error model f
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study."""
+    """Reproduce Hwang's study, and return its claims, tables and figures."""
     c = setup.compute(seed, progress)
     numbers = exhibits.numbers("redo", c, models=sum(c.grouped.searched_), shaken=c.shaken["uniform", 0.4])
     return Study.of("hwang", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))
@@ -138,7 +138,7 @@ def _noise(c: Computed) -> Facts:
 
 
 def _tables(c: Computed) -> tuple[StudyTable, ...]:
-    """Return the tables."""
+    """Return the tables of the study."""
     swept = [
         (i, g, " (taken)" if i is c.interval else "", setup.agreement(i.groups), named(g.selected_), _unseen(g, c))
         for i, g in c.swept
@@ -161,7 +161,7 @@ def _tables(c: Computed) -> tuple[StudyTable, ...]:
 
 
 def _figures(c: Computed) -> tuple[Figure, ...]:
-    """Return the figures."""
+    """Return the figures of the study."""
     first = c.new.test == 0
     z = c.new.deviations[first, 0]
     fitted = {"measured": c.drift} | {name: c.fitted(name) for name in (OPTIMAL, JUDGED)}

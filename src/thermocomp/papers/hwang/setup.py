@@ -1,9 +1,9 @@
 """Computation of the study of Hwang, Lee and Yang; `thermocomp.papers.hwang.redo` presents it.
 
-One test of six hours in three states drawn at random, 14 sensors, drift Z. T14 (bed) is the reference: each variable is
-``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper is
-unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all others.
-The performance on new tests, with other orders of the states and other weather, is reported in addition.
+One test of six hours in three states selected at random, 14 sensors, drift Z. T14 (bed) is the reference: each variable
+is ``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper
+is unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all
+others. The performance on new tests, with other orders of the states and other weather, is reported in addition.
 """
 
 from collections.abc import Sequence
@@ -53,7 +53,7 @@ SAME = 1.1
 
 @dataclass(frozen=True)
 class PaperFit:
-    """A model and its goodness of fit.
+    """A model with R2 and standard error in its training rows.
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ def agreement(groups: Groups) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of Hwang.
 
     Parameters
     ----------
     fit, new : Samples
-        Training test and new tests.
+        Test used for training, and new tests.
     grouped, single : CorrelationGrouping
         At the selected threshold, and without grouping, i.e. with each temperature as a separate group.
     interval : Interval
@@ -148,7 +148,7 @@ class Computed:
         return self.fit.values[:, :-1] - self.fit.values[:, -1:]
 
     def fitted(self, name: str) -> FloatArray:
-        """Return the output of a model for the training rows [um]."""
+        """Return the deviation computed by a model in the training rows [um]."""
         return common.predict_deviation(self.fits[name].model, self.fit)
 
     @cached_property
@@ -160,7 +160,7 @@ class Computed:
 
     @cached_property
     def errors(self) -> dict[str, common.Errors]:
-        """Error figures of each model in the new tests."""
+        """Error metrics of each model in the new tests."""
         return {name: common.Errors.of(e) for name, e in self.residuals.items()}
 
 
@@ -219,5 +219,5 @@ def _dynamic(tests: Sequence[Recording]) -> FloatArray:
 
 
 def named(columns: Sequence[int]) -> str:
-    """Return the sensor names of columns."""
+    """Return the names of the sensors in the given columns as text."""
     return " ".join(NAMES[k] for k in columns) or "none"

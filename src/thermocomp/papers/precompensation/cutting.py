@@ -70,7 +70,7 @@ class Changing(Climate):
     def air(
         self, state: FloatArray, start: float, step: float, n_steps: int, rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the air at the end of each of several equal steps, see `Climate.air`.
+        """Return the state of the air at the end of each of several equal steps, see `Climate.air`.
 
         Parameters
         ----------
@@ -134,13 +134,14 @@ class Milled:
     Parameters
     ----------
     surfaces : dict of (str, str, str) to Surfaces
-        Surfaces by case, model and revision method; unrevised: `NONE` and an empty method.
+        Surfaces by case, model and revision method; of unrevised programs: `NONE` and an empty method.
     turning : float
         Share of the time during which the spindle speed of the programs equals that of the recorded tests.
     lines : int
         Number of lines of the first program.
     first : dict of str to list of (Face, ndarray)
-        Faces of the first test, cold, with their surface positions [um]; by revision method, with the net.
+        Faces of the first test, cold, with their surface positions [um]; by revision method, with the neural net as the
+        model.
     """
 
     surfaces: dict[tuple[str, str, str], Surfaces] = field(default_factory=dict)
@@ -149,11 +150,11 @@ class Milled:
     first: dict[str, list[tuple[program.FacedSurface, FloatArray]]] = field(default_factory=dict)
 
     def without(self, case: str) -> Surfaces:
-        """Return the surfaces milled with the unrevised programs."""
+        """Return the surfaces milled with the original programs, without correction."""
         return self.surfaces[case, NONE, ""]
 
     def paper(self, case: str, model: str = NET) -> Surfaces:
-        """Return the surfaces of the paper's method."""
+        """Return the surfaces milled with programs revised by the paper's method."""
         return self.surfaces[case, model, program.EVERY]
 
 

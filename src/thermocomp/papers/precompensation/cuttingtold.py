@@ -103,7 +103,7 @@ def _surfaces(m: Milled, way: str, number: int) -> tuple[FloatArray, FloatArray]
 
 
 def numbers(m: Milled) -> dict[str, float]:
-    """Return the numbers by name."""
+    """Return the key numbers of the cutting tests, by name."""
     short = {
         RIGHT: "cold",
         UNKNOWN: "warm_taken_for_cold",

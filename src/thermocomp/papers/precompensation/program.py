@@ -199,7 +199,7 @@ class FacedSurface:
     time : ndarray of shape (n,)
         [s]
     z : ndarray of shape (n,)
-        Commanded minus drawing [um].
+        Commanded minus drawing position [um].
     """
 
     number: int
@@ -208,7 +208,7 @@ class FacedSurface:
     z: FloatArray
 
     def surface(self, drift: Recording) -> FloatArray:
-        """Return the position of the surface, actual minus drawing, (n,) [um]."""
+        """Return the position of the surface, actual minus drawing position, (n,) [um]."""
         columns = [drift.table[f"z_at_{p}_um"].to_numpy(dtype=np.float64) for p in POSITIONS]
         there = np.column_stack([np.interp(self.time, drift.time, column) for column in columns])
         at = self.position + self.z / 1e3
@@ -240,7 +240,7 @@ def _cuts(block: Block) -> bool:
 
 
 def _looked_at(block: Block, start: float, end: float, position: float) -> FloatArray:
-    """Return times [s], and commanded minus drawing [um], over a pass: an array with two rows."""
+    """Return times [s], and commanded minus drawing positions [um], over a pass: an array with two rows."""
     share = (np.arange(n := max(1, round((end - start) / LOOK))) + 0.5) / n
     z = np.interp(share, (0.0, 1.0), (block.moves[0].start[2], block.moves[-1].end[2]))
     return np.array([start + share * (end - start), 1e3 * (z - position)])

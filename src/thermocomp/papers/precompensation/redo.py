@@ -26,7 +26,7 @@ BEYOND = 0.02
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study."""
+    """Reproduce the study of pre-compensation, and return its claims, tables and figures."""
     c = setup.compute(seed, lambda share, what: progress(share / 2, what))
     models = c.models | cutting.house_models(c.learn)
     m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))

@@ -81,7 +81,7 @@ class Warm:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of precompensation.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Computed:
     orders : list of tuple of Order
         Table of final prediction errors per position.
     hidden : list of int
-        Hidden nodes of the nets.
+        Number of hidden nodes of each neural net.
     one_step : float
         One-step-ahead RMS of least squares with k = 1, m = 0 over all positions [um].
     clocks : dict of float to (tuple of int, float, float)
@@ -123,18 +123,18 @@ class Computed:
 
     @cached_property
     def left(self) -> dict[str, FloatArray]:
-        """Residuals of the verification, (n_rows, n_positions) [um]."""
+        """Residuals of each model in the verification, (n_rows, n_positions) [um]."""
         z = self.judge.deviations
         return {NONE: z} | {name: z - p for name, p in self.free_run.items()}
 
     @cached_property
     def errors(self) -> dict[str, Errors]:
-        """Error figures of each model in the verification, over all positions."""
+        """Error metrics of each model in the verification, over all positions."""
         return {name: Errors.of(e) for name, e in self.left.items()}
 
     @property
     def scheduled(self) -> float:
-        """RMS residual of the verification with the schedule [um]."""
+        """RMS residual of the verification with the schedule of corrections [um]."""
         return rms(self.judge.deviations + self.schedule)
 
     @cached_property
@@ -144,7 +144,7 @@ class Computed:
 
     @property
     def by_fpe(self) -> list[Order]:
-        """Orders with the smallest final prediction error, by position."""
+        """Model orders with the smallest final prediction error, by position."""
         return [min((o for o in table if o.admissible), key=lambda o: o.fpe) for table in self.orders]
 
     @property

@@ -87,7 +87,7 @@ def rows(table: StudyTable) -> list[list[str]]:
 
 
 def paint(figure: Figure, canvas: Canvas) -> None:
-    """Draw a figure of a study."""
+    """Draw a figure of a study on a matplotlib figure."""
     columns = figure.columns
     axes = canvas.subplots(-(-len(figure.panels) // columns), columns, squeeze=False).ravel()
     for ax in axes[len(figure.panels) :]:
@@ -137,7 +137,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
 
 
 def write(studies: Sequence[Study], path: Path, *, seed: int, overwrite: bool = False) -> None:
-    """Write studies as a page."""
+    """Write studies as a self-contained HTML page."""
     write_text(render(studies, seed=seed), path, overwrite=overwrite)
 
 

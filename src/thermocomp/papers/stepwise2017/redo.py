@@ -19,7 +19,7 @@ FIGURE_2 = (3, 11, 14)
 
 
 def run(seed: int, progress: Progress) -> Study:
-    """Reproduce the study."""
+    """Reproduce the study stepwise2017, and return its claims, tables and figures."""
     c = setup.compute(seed, progress)
     numbers = exhibits.numbers("redo", c, temperatures=len(c.fit.inputs) - 1, fewest=c.thinned[-1].names)
     return Study.of("stepwise2017", TITLE, Part(claims(c), _tables(c), _figures(c), numbers))

@@ -66,12 +66,12 @@ class Thinned:
 
 @dataclass(frozen=True, eq=False)
 class Computed:
-    """All results of the study.
+    """All results of the study of stepwise2017.
 
     Parameters
     ----------
     fit, online : Samples
-        Training test, and test on another day.
+        Test used for training, and test on another day.
     models : dict of str to ErrorModel
         Models by the names of `METHODS`.
     absolute : float
@@ -90,7 +90,7 @@ class Computed:
 
     @cached_property
     def left_in_fit(self) -> dict[str, FloatArray]:
-        """Residuals of each model in the training test [um]."""
+        """Residuals of each model in the test used for training [um]."""
         return _left(self.models, self.fit)
 
     @cached_property
@@ -100,12 +100,12 @@ class Computed:
 
     @cached_property
     def errors(self) -> dict[str, common.Errors]:
-        """Error figures of each model in the on-line test."""
+        """Error metrics of each model in the on-line test."""
         return {name: common.Errors.of(e) for name, e in self.left.items()}
 
     @property
     def fitted(self) -> common.Errors:
-        """Error figures of the stepwise model in the training test."""
+        """Error metrics of the stepwise model in the test used for training."""
         return common.Errors.of(self.left_in_fit[STEPWISE])
 
     @property

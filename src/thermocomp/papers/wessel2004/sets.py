@@ -60,7 +60,7 @@ class Selection:
 
     @cached_property
     def chosen(self) -> tuple[int, ...]:
-        """Indices of the chosen temperatures, from 0."""
+        """Indices (0-based) of the temperatures in the chosen set."""
         return _choice(self.small)
 
     @cached_property
@@ -74,16 +74,16 @@ class Selection:
 
     @property
     def sets(self) -> int:
-        """Number of all sets."""
+        """Number of all sets of temperatures."""
         return len(self.psi.subsets) + len(self.larger.subsets)
 
     def models(self, sets: int) -> int:
-        """Return the number of models for a number of sets."""
+        """Return the number of models for a number of sets: one per set, data set and displacement."""
         return sets * len(self.rows) * len(self.psi.psi)
 
 
 def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) -> Selection:
-    """Reproduce Appendix B (W-10 to W-12)."""
+    """Reproduce Appendix B: selection of temperatures by maximal correlation (W-10 to W-12)."""
     progress(0.0, "23 data sets on the resting tool")
     recordings = record("wessel-sets", physics=physics, seed=seed)
     data = [DataSet(r.name, r.values(r.temperatures), r.values(r.displacements)) for r in recordings]
@@ -112,7 +112,7 @@ def appendix_b(seed: int, progress: Progress, physics: Physics | None = None) ->
 
 
 def told(s: Selection) -> Part:
-    """Return the report of Appendix B."""
+    """Return the claims, tables and key numbers of Appendix B."""
     counts = s.small.equivalent.sum(axis=1)
     best = s.by_size[MOST].min()
     numbers = exhibits.numbers("sets", s, models=s.models(s.sets), best_psi=best, equivalent=counts)

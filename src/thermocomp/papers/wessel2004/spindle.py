@@ -1,4 +1,4 @@
-"""Wessel's section III: the finite-element spindle, learned in one speed regime, estimated in another."""
+"""Wessel's section III: the finite-element spindle; models are trained in one speed regime and used in another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ CLOSE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Spindle:
-    """The two series.
+    """Results for the finite-element spindle: two series, of which one is estimated from the other.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        Learned and estimated recording.
+        Recording used for training, and recording to be estimated.
     peaked : MillingTrial
         Trial in which the series with the wider span is estimated: `found`, or a trial with the two series exchanged.
     """
@@ -60,7 +60,7 @@ class Spindle:
 
     @property
     def span(self) -> float:
-        """Span of the estimated displacement [um]."""
+        """Maximum minus minimum of the measured displacement in the estimated series [um]."""
         return float(np.ptp(self.found.measured))
 
     @cached_property
@@ -75,7 +75,7 @@ class Spindle:
 
 
 def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Reproduce section III (W-01 to W-07)."""
+    """Reproduce section III, the finite-element spindle (W-01 to W-07)."""
     progress(0.0, "finite-element spindle")
     recordings = record("wessel-fem", physics=physics, seed=seed)
     target = len(recordings[0].displacements) - 1  # S4, at the front tip of the tool
@@ -149,7 +149,7 @@ def _guarded(s: Spindle) -> Facts:
 
 
 def runs(rows: BoolArray) -> list[slice]:
-    """Return the runs of consecutive true rows."""
+    """Return start and end of each run of consecutive rows in which a mask is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 

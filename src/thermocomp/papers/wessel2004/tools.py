@@ -49,7 +49,7 @@ OVER, UNDER = (10, 40), 60
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """The resting tool.
+    """Results for the heated resting tool.
 
     Parameters
     ----------
@@ -68,12 +68,12 @@ class Resting:
 
     @cached_property
     def order(self) -> list[tuple[int, ...]]:
-        """The sets in order of their RMS, the best first."""
+        """Sets of temperatures in order of their RMS in the unseen test, the best first."""
         return sorted(self.by_set, key=lambda s: self.by_set[s])
 
 
 def resting_tool(seed: int, progress: Progress, selection: Selection, physics: Physics | None = None) -> Part:
-    """Reproduce section IV (W-08)."""
+    """Reproduce section IV, the heated resting tool (W-08)."""
     progress(0.0, "resting tool")
     recordings = record("wessel-tool", physics=physics, seed=seed)
     paper, own = (trial(recordings, 0, chosen) for chosen in (PAPERS_OWN, selection.chosen))
@@ -92,7 +92,7 @@ def resting_tool(seed: int, progress: Progress, selection: Selection, physics: P
 
 
 def milling_machine(seed: int, progress: Progress, physics: Physics | None = None) -> Part:
-    """Reproduce section V (W-09): four days are learned, the fifth is estimated."""
+    """Reproduce section V, the milling machine (W-09): trained on four days, used on the fifth."""
     progress(0.0, "milling machine, five days")
     recordings = record("wessel-milling", physics=physics, seed=seed)
     found = trial(recordings, 0, range(len(recordings[0].temperatures)))

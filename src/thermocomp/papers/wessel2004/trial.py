@@ -36,7 +36,7 @@ LOOP_STEPS = 20
 
 @dataclass(frozen=True, eq=False)
 class MillingTrial:
-    """One displacement learned on some tests and estimated in another.
+    """One displacement, with a model trained on some tests and used in another.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class MillingTrial:
     estimates : dict of str to ndarray of shape (n_unseen,)
         Estimates in the unseen test, by method [um].
     fits : dict of str to ndarray of shape (n_learned,)
-        Estimates in the training tests, by method [um].
+        Estimates in the tests used for training, by method [um].
     flagged : ndarray of bool of shape (n_unseen,)
         Whether a temperature is outside the training range: the guard of the frozen model.
     """
@@ -61,7 +61,7 @@ class MillingTrial:
 
     @property
     def target(self) -> str:
-        """Name of the displacement."""
+        """Name of the displacement channel."""
         return self.unseen.targets[0].name
 
     @property
@@ -90,7 +90,7 @@ class MillingTrial:
         return rms(self.residual(method))
 
     def fit_rms(self, method: str) -> float:
-        """Return the root mean square of the residual of one of `fits` in the training tests [um]."""
+        """Return the root mean square of the residual of one of `fits` in the tests used for training [um]."""
         return rms(self.learned.deviations[:, 0] - self.fits[method])
 
     def numbers(self, prefix: str) -> dict[str, float]:
@@ -104,7 +104,7 @@ class MillingTrial:
         }
 
     def rms_by_method(self, prefix: str) -> dict[str, float]:
-        """Return `rms` by the short names of the methods, with a prefix."""
+        """Return the RMS residuals by the short names of the methods, with a prefix."""
         short = {"ace": ACE_NAME, "mlr": MLR_NAME, "ace_monotone": "ace-monotone", "dynamic": "dynamic"}
         return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
@@ -129,7 +129,7 @@ class MillingTrial:
         return {n: np.corrcoef(c.x, c.y)[0, 1] ** 2 if varying[n] else 1.0 for n, c in curves.items()}
 
     def rms_beside(self, *methods: str) -> dict[str, float]:
-        """Return `rms` by the names of all other methods."""
+        """Return the RMS residuals of all methods except one, by name."""
         return {m: self.rms(m) for m in self.estimates if m not in methods}
 
     def reasons(self) -> Facts:
@@ -210,7 +210,7 @@ def loop_width(samples: Samples) -> float:
 
 
 def points(samples: Samples) -> FloatArray:
-    """Return the numbers of the measuring points."""
+    """Return the numbers of the measuring points, from 1."""
     return np.arange(1, len(samples) + 1, dtype=np.float64)
 
 

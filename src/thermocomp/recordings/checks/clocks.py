@@ -13,9 +13,9 @@ from thermocomp.recordings.checks.findings import Finding, Signal
 _LAGS = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
 #: largest clock shift tested, and smallest one reported [s]
 _FAR, _NEAR = 2400.0, 480.0
-#: minimum gain in log-likelihood of a shift of a group of channels; valid tests reach 2 at shifts that are reported
+#: minimum gain in log-likelihood for a shift of a group of channels to be reported; valid recordings reach 2
 _GAIN = 60.0
-#: the same for single channels that lag; valid ones reach 40
+#: the same for single channels that lag; valid recordings reach 40
 _LATE = 100.0
 _LONGEST = 20_000
 
@@ -52,9 +52,9 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
     lead by as much; if they lag, only two or more together, each with a gain in log-likelihood of over 100, because a
     remote sensor may respond late.
 
-    No result is given for a test without speed or with fewer than two speed changes, for one shorter than 2 h 20 min,
-    or for channels that do not respond to the spindle. In a test with a periodic speed the reported shift may be wrong
-    by the period.
+    No result is given for a test without a spindle speed channel or with fewer than two speed changes, for one shorter
+    than 2 h 20 min, or for channels that do not respond to the spindle. In a test with a periodic speed the reported
+    shift may be wrong by the period.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def _fit(group: Sequence[Signal], time: FloatArray, speed: FloatArray) -> _Fits 
 
 
 def _means(time: FloatArray, values: FloatArray, good: BoolArray, edges: FloatArray) -> FloatArray:
-    """Return the mean of a signal between consecutive edges."""
+    """Return the means of a signal between consecutive times."""
     x = np.interp(time, time[good], values[good])
     area = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(time))])
     return np.asarray(np.diff(np.interp(edges, time, area)) / np.diff(edges))

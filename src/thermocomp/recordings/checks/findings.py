@@ -68,17 +68,17 @@ class Signal:
 
     @cached_property
     def rows(self) -> IntArray:
-        """Row numbers of the good rows."""
+        """Numbers of the rows with a usable value."""
         return np.flatnonzero(self.good)
 
     @cached_property
     def x(self) -> FloatArray:
-        """Values in the good rows."""
+        """Usable values of the channel."""
         return self.values[self.good]
 
     @cached_property
     def span(self) -> float:
-        """Range of a running median over 21 good rows, or all if fewer; range of the good values if this is 0."""
+        """Range of a running median over 21 usable rows, or all if fewer; range of the usable values if this is 0."""
         width = min(21, (len(self.x) - 1) // 2 * 2 + 1)
         smooth = pd.Series(self.x).rolling(width, center=True, min_periods=(width + 1) // 2).median().to_numpy()
         return float(np.ptp(smooth)) or float(np.ptp(self.x))
@@ -89,7 +89,7 @@ class Signal:
         return 1.4826 * float(np.median(np.abs(np.diff(self.x, n=2)))) / 6**0.5
 
     def without(self, rows: IntArray) -> "Signal":
-        """Return the signal with some rows excluded from the good ones."""
+        """Return the signal with some rows marked as unusable."""
         good = self.good.copy()
         good[rows] = False
         return replace(self, good=good)
@@ -138,7 +138,7 @@ def at_row(row: int, time: FloatArray) -> str:
 
 
 def count(n: int, what: str) -> str:
-    """Return a number of items as text."""
+    """Return a number and a noun in singular or plural, such as ``3 rows``."""
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 

@@ -134,7 +134,7 @@ def jumps(signals: Sequence[Signal], time: FloatArray, moved: BoolArray) -> Iter
 
 
 def _explained(mine: Edges, k: int, moved: BoolArray) -> bool:
-    """Return whether the spindle speed changes at jump `k`, and other such changes move the channel a third as much."""
+    """Return whether jump `k` is due to a speed change: other such changes move the channel by a third as much."""
     near = np.convolve(moved, np.ones(7), mode="same") > 0
     if not near[mine.before[k] : mine.after[k]].any():
         return False

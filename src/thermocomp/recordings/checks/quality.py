@@ -68,7 +68,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 
 
 def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = None) -> dict[str, BoolArray]:
-    """Return the rows in which a channel is in trouble while its other rows are sound.
+    """Return the rows in which a channel is faulty while its other rows are sound.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
     Returns
     -------
     dict of str to ndarray of bool of shape (n_rows,)
-        By channel name; only channels with such rows: spikes, codes, implausible values, stuck values, and the section
-        between a step and its reversal. See `lasting_trouble` for other troubles.
+        By channel name; only channels with such rows: spikes, error codes, implausible values, stuck values, and the
+        section between a step and its reversal. See `lasting_trouble` for other troubles.
     """
     rows: dict[str, BoolArray] = {}
     for f in check(recording) if findings is None else findings:
@@ -96,7 +96,7 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def _together(
     signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
 ) -> Iterator[Finding]:
-    """Yield joint findings of several channels, or of a channel and the clock; times from stamps have no unit."""
+    """Yield findings on several channels together; the time unit is checked unless the times are time stamps."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
@@ -135,7 +135,7 @@ def _probed(recording: Recording) -> set[str]:
 def _channel(
     channel: Channel, values: FloatArray, time: FloatArray, moved: BoolArray, *, probed: bool
 ) -> tuple[Signal, list[Finding]]:
-    """Return the sound part of a channel, and all findings of this channel alone."""
+    """Return the sound values of a channel, and the findings for which no other channel is needed."""
     least, most = PLAUSIBLE.get(channel.quantity, (-np.inf, np.inf))
     plausible = (values >= least) & (values <= most)
     coded = _coded(channel, values, plausible)
@@ -236,7 +236,7 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
 
 
 def _coded(channel: Channel, values: FloatArray, plausible: BoolArray) -> BoolArray:
-    """Return the rows with a known code, if it differs from all other values by half their span and by 5 units."""
+    """Return the rows with an error code that differs from all other values by half their span and by 5 or more."""
     none = np.zeros(len(values), dtype=np.bool_)
     if channel.quantity not in _SENSED:
         return none

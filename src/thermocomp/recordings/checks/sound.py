@@ -1,4 +1,4 @@
-"""Effect of the findings of `check` on judging: rows in trouble are excluded, other trouble is kept as a note."""
+"""Effect of the findings of `check` on judging: faulty rows are excluded, other trouble is kept as a note."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from thermocomp.recordings.samples import Samples
 
 
 def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
-    """Return samples without the values in trouble."""
+    """Return samples without the faulty values."""
     values, deviations = samples.values.copy(), samples.deviations.copy()
     trouble: list[tuple[str, str]] = []
     for k, recording in enumerate(recordings):

@@ -19,8 +19,9 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
 
     A single value is a spike if it deviates from its four neighbours by over 8 robust standard deviations, over the
     range of these neighbours, and over 2 % of the span of the channel. For 2 to 10 consecutive rows the same applies to
-    five neighbours on each side, plus over 4 times the largest change among them. Trouble where a spike is higher than
-    the span. The span is the range of a running median over 21 rows, which excludes spikes of this length.
+    five neighbours on each side, plus over 4 times the largest change among them. It is reported as trouble if a spike
+    is higher than the span. The span is the range of a running median over 21 rows, which excludes spikes of this
+    length.
 
     Parameters
     ----------

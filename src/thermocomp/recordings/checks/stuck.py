@@ -69,7 +69,7 @@ def _by_chance(x: FloatArray, step: float, lively: BoolArray) -> float:
 
 
 def _why(x: FloatArray, start: int, length: int, step: float, possible: float) -> Severity | None:
-    """Return the severity of a constant section of `length` rows, from the 50 rows on each side; None if harmless."""
+    """Return the severity of a constant section of `length` rows, by the 50 rows on each side; None if harmless."""
     before, after = x[max(start - 50, 0) : start + 1], x[start + length - 1 : start + length + 50]
     sides = [np.diff(side) for side in (before, after) if len(side) > 30]
     if not sides:

@@ -31,7 +31,7 @@ Kinds = Callable[[int], Kind]
 
 
 def find_kind(cells: Sequence[str]) -> Kind:
-    """Return the kind of contents of cells."""
+    """Return what cells of a column contain: numbers, dates, times of day, timestamps or other text."""
     if not cells:
         return ""
     texts = [cell.strip().lstrip("'") for cell in cells]

@@ -12,7 +12,7 @@ _NAME = re.compile(rf"(?P<code>E[XYZABC][XYZ])_(?P<others>(?:[xyz]{_NUMBER}_)*)(
 
 
 def codes(recording: Recording) -> tuple[str, ...]:
-    """Return the components with separate columns, in the order of `thermocomp.core.components`."""
+    """Return the error components that have their own columns, in the order of `thermocomp.core.components`."""
     return tuple(c.code for c in COMPONENTS if columns_of(recording, c.code)[0])
 
 

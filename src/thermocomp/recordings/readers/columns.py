@@ -131,7 +131,7 @@ class ColumnPlan:
 
 
 def plan(table: FileTable, mapping: Mapping) -> ColumnPlan:
-    """Determine the columns to be read, and their meaning."""
+    """Determine the columns of a file that are read, and the quantity and unit of each."""
     headings, source = table.headings, str(table.path)
     kinds = cache(partial(find_column_kind, table))
     meanings = _understand_all(headings, mapping, source)

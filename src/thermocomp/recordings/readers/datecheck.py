@@ -142,7 +142,7 @@ def _usual(t: FloatArray) -> float:
 
 
 def _runs_on(days: IntArray, t: FloatArray) -> bool:
-    """Return whether no pause coincides with a change of date: times that start at zero may then be elapsed times."""
+    """Return whether no pause spans a change of date: times that start at zero may then be elapsed times."""
     return bool((np.diff(t)[np.diff(days) != 0] <= 2 * _usual(t)).all())
 
 

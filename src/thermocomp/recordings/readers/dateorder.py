@@ -17,7 +17,7 @@ _MONTH = 26
 
 
 class DateChoice(NamedTuple):
-    """The selected order."""
+    """The selected order of day, month and year."""
 
     order: str  #: empty if several are possible
     by: Literal["rising", "going on", ""]

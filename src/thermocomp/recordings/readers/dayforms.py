@@ -185,7 +185,7 @@ def _read_digits(parts: "pd.Series[str]") -> list[IntArray]:
 
 
 def _are_parts(texts: "pd.Series[str]") -> bool:
-    """Return whether texts count parts: 1/3, 2/3, 3/3."""
+    """Return whether texts are part numbers, not dates: 1/3, 2/3, 3/3."""
     parts = texts.str.extract(r"^([1-9]\d?)/([1-9]\d?)$")
     return bool(parts[0].iloc[0] == "1" and parts[0].notna().all() and parts[1].nunique() == 1)
 

@@ -32,7 +32,7 @@ def _plain(cell: object) -> str:
 
 
 def are_halves(cells: Sequence[str], heading: str) -> bool:
-    """Return whether cells specify the half of the day."""
+    """Return whether cells contain only AM or PM, in one of the supported languages."""
     words = {_plain(cell) for cell in cells}
     known = (*_CERTAIN[0], *_CERTAIN[1], *_MAYBE[0], *_MAYBE[1])
     if words.issubset(known) or says_halves(heading):
@@ -41,7 +41,7 @@ def are_halves(cells: Sequence[str], heading: str) -> bool:
 
 
 def says_halves(heading: str) -> bool:
-    """Return whether a heading denotes AM and PM."""
+    """Return whether a heading denotes a column of AM and PM."""
     return _HEADING.search(heading) is not None
 
 

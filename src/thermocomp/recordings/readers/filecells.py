@@ -37,7 +37,7 @@ class FileCells:
 
     @property
     def times(self) -> TimePlan:
-        """Columns that contain the time."""
+        """Columns that contain the time, by position."""
         return self.columns.times
 
     @property

@@ -79,7 +79,7 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
 
 
 def _table(heading: str, number: int, place: str | int, role: str, unit: str) -> Remedy:
-    """Return the mapping entry for a column with or without a role."""
+    """Return the suggested mapping entry for a column, with its role if one was guessed."""
     base = "_".join(re.sub(r"[^\w\s.-]", " ", heading).split()) or f"column_{number + 1}"
     name = f"{base}_{HOUSE_SUFFIX[HOUSE_UNITS[role]]}" if role else base
     said: dict[str, Any] = {} if name == place else {"column": place}
@@ -111,7 +111,7 @@ def _numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
 
 
 def _mostly_numbers(table: FileTable, columns: Sequence[int]) -> dict[int, FloatArray]:
-    """Return a column of which some cells are texts."""
+    """Return the columns in which more cells contain numbers than text, as numbers."""
     cells, _ = table.load([], columns)
     found = {}
     for k in columns:

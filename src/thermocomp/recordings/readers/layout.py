@@ -41,7 +41,7 @@ _STATISTICS = frozenset(read_words("statistics"))
 
 
 class FileLayout(NamedTuple):
-    """Row indices (0-based) in the rows examined."""
+    """Rows of headings, units and table, as indices (0-based) into the examined rows."""
 
     heading: int  #: row of the headings
     units: int  #: row of the units; same as `heading` if there is none
@@ -132,13 +132,13 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
 
 
 def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
-    """Return a note on the lines that repeat the headings."""
+    """Return a note for the user on the lines that repeat the headings."""
     places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
     return (f"the headings come again, passed over, in line {places}",) if lines else ()
 
 
 def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
-    """Return a note on the rows omitted at the end."""
+    """Return a note for the user on the rows omitted at the end of a file."""
     what = "is no row" if len(numbers) == 1 else "are no rows"
     return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
 

@@ -76,7 +76,7 @@ class FileLimits:
                 raise InputError(f"[limits]: {f.name} = {getattr(self, f.name)}: must be at least 1")
 
     def check(self, name: str, found: int, where: object) -> None:
-        """Reject a value that exceeds a limit."""
+        """Reject a size or count that exceeds one of the limits."""
         most = getattr(self, name)
         if found > most:
             counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
@@ -86,7 +86,7 @@ class FileLimits:
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
-        """Reject a table that is too large."""
+        """Reject a table with too many rows, columns or cells."""
         self.check("columns", columns, where)
         self.check("rows", rows, where)
         self.check("cells", rows * columns, where)

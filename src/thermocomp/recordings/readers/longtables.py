@@ -119,7 +119,7 @@ def _place_columns(rows: Rows, position: str, axis: str, owner: str) -> dict[str
 
 
 def _states(rows: Rows, column: str, at: FloatArray) -> IntArray:
-    """Return the number of the thermal state of each row, from 0."""
+    """Return the index of the thermal state to which each row belongs."""
     if column and column not in rows.extra:
         raise InputError(f"{rows.source}: there is no column {column!r} for the states")
     labels = next(iter(rows.extra.values()), None)

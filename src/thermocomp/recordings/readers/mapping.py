@@ -147,7 +147,7 @@ class ReadOptions:
     sheet: str = ""
 
     def skips(self, place: int) -> bool:
-        """Return whether a line or row (1-based) is skipped."""
+        """Return whether the mapping skips a line or row (1-based) of the file."""
         return any(place == s if isinstance(s, int) else s[0] <= place <= s[1] for s in self.skip)
 
 
@@ -179,7 +179,8 @@ class Mapping:
     clean : tuple of Step
         Changes of the values read, in this order; see `thermocomp.recordings.cleaning`.
     compensation : {'', 'off', 'known', 'unknown'}
-        Whether a correction was in force at the machine; see `thermocomp.recordings.compensated`.
+        ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
+        have been; empty: not specified. See `thermocomp.recordings.compensated`.
     """
 
     time: TimeColumn = TimeColumn()
@@ -258,7 +259,7 @@ def read_mapping(path: str | Path) -> Mapping:
 
 
 def check_content(content: dict[str, Any], owner: str) -> Mapping:
-    """Return the mapping defined by TOML content."""
+    """Return the mapping defined by the content of a TOML file, or raise an error that names the key."""
     try:
         return ADAPTER.validate_json(as_json(content))
     except ValidationError as e:
@@ -285,7 +286,7 @@ def _explain(failure: ValidationError) -> str:
 
 
 def _explain_step(error: ErrorDetails) -> str:
-    """Return the error of a table ``[[clean]]``."""
+    """Return the error message for an invalid table ``[[clean]]``."""
     loc = error["loc"]
     table = f"[[clean]] number {int(loc[1]) + 1}" if len(loc) > 1 else "[[clean]]"
     if len(loc) < 4:

@@ -95,16 +95,16 @@ class Draft:
 
     @property
     def text(self) -> str:
-        """TOML of the mapping."""
+        """The mapping as TOML text."""
         written = tomlkit.dumps(self.document).strip()
         return f"{re.sub(_TIGHT, _APART, written)}\n" if written else ""
 
     def mapping(self, owner: str) -> Mapping:
-        """Return the resulting mapping."""
+        """Return the mapping that the draft defines."""
         return check_content(self.document.unwrap(), owner)
 
     def add(self, remedy: Remedy) -> bool:
-        """Add a remedy; return False if it was contained already."""
+        """Add a suggested entry to the mapping; return False if it is already there."""
         before = copy.deepcopy(self.document.unwrap())
         for key, content in remedy.items():
             if key == "clean":
@@ -147,7 +147,7 @@ class Mended:
 
 
 def read_draft(mapping: str | Path | None) -> str:
-    """Return the text of an initial mapping, after validation; empty for None."""
+    """Return the text of the mapping file to start from, after validation; empty if there is none."""
     if mapping is None:
         return ""
     read_mapping(mapping)  # raises an error if it is invalid
@@ -155,7 +155,7 @@ def read_draft(mapping: str | Path | None) -> str:
 
 
 def mend(path: str | Path, text: str, decide: Decide) -> Mended:
-    """Create a mapping with which a file can be read and is cleaned."""
+    """Create a mapping with which a file can be read, and which repairs its data-quality problems."""
     owner = str(path)
     dialogue = _Dialogue(Draft(text), decide, path)
     table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))[0]
@@ -187,7 +187,7 @@ def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording
 
 
 def located(finding: Finding, recording: Recording, mapping: Mapping, headings: Sequence[str]) -> Remedy:
-    """Return the remedy of a finding in the form required by a mapping of the file."""
+    """Return the correction for a finding, as an entry of the mapping of its file."""
     remedy: dict[str, Any] = copy.deepcopy(dict(finding.remedy or {}))
     for step in remedy.get("clean", ()):
         if "times" in step:
@@ -208,7 +208,7 @@ def located(finding: Finding, recording: Recording, mapping: Mapping, headings: 
 
 
 def to_toml(remedy: Remedy) -> str:
-    """Return a remedy as text of a mapping file."""
+    """Return a suggested mapping entry as TOML text."""
     draft = Draft()
     draft.add(remedy)
     return draft.text.strip()
@@ -238,7 +238,7 @@ class _Dialogue:
         self.decided: list[tuple[Question, Remedy | None]] = []
 
     def ask(self, question: Question) -> bool:
-        """Have a question decided, each question only once; return whether the mapping has new entries."""
+        """Ask a question, each only once, and add the answer to the mapping; return whether it has new entries."""
         if any(q.text == question.text and q.options == question.options for q, _ in self.decided):
             return False
         answer = self.decide(question)
@@ -259,7 +259,7 @@ class _Dialogue:
         return holds_own_date(table, error.remedies[0]["read"]["skip"][-1])
 
     def until(self, action: Callable[[], _T]) -> _T:
-        """Run an action repeatedly, and have each error decided."""
+        """Repeat an action until it succeeds; after each error, ask which of the suggested mapping entries to add."""
         for _ in range(MOST_QUESTIONS):
             try:
                 return action()
@@ -277,7 +277,7 @@ class _Dialogue:
 
 
 def _skips(remedy: Remedy) -> bool:
-    """Return whether a remedy skips a row."""
+    """Return whether a suggested mapping entry skips a row of the file."""
     return "skip" in remedy.get("read", {})
 
 
@@ -301,7 +301,7 @@ def _offer(path: Path, mapping: Mapping, error: InputError) -> str:
 
 
 def _offer_choice(text: str, remedies: Sequence[Remedy], name: str) -> str:
-    """Return the text that lists the choices for the user."""
+    """Return the message that lists the suggested mappings between which the user must choose."""
     ways = "\n# or:\n".join(re.sub(r"^", "# ", to_toml(way), flags=re.MULTILINE) for way in remedies)
     return f"choose one, save it as {name} without the # and give it with --mapping {name}:\n\n{text}{ways}"
 

@@ -21,7 +21,7 @@ _OPEN = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 
 
 class Notation(NamedTuple):
-    """Number format of a file."""
+    """Number format of a file: decimal sign and thousands separators."""
 
     decimal: str  #: point or comma
     thousands: str = ""  #: allowed separators between groups of three digits
@@ -55,7 +55,7 @@ class Signs:
         self.groups: set[str] = set()
 
     def add(self, cells: Iterable[str]) -> None:
-        """Add cells to the evidence."""
+        """Take further cells of the file as evidence for its decimal sign."""
         for cell in cells:
             text = cell.strip()
             grouped = _GROUPED.fullmatch(text)

@@ -129,7 +129,7 @@ class ParquetTable(FileTable):
 
 @contextmanager
 def _translated(path: Path) -> Iterator[None]:
-    """Convert any error that a damaged file causes in the library to a `RecordingError`."""
+    """Convert any error that a damaged file causes in the Parquet library to a `RecordingError`."""
     try:
         yield
     except InputError:
@@ -141,7 +141,7 @@ def _translated(path: Path) -> Iterator[None]:
 
 
 def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
-    """Open a Parquet file."""
+    """Open a Parquet file as a table, after a check of its size."""
     try:
         from pyarrow.parquet import ParquetFile
     except ImportError as e:

@@ -49,7 +49,7 @@ def read(path: str | Path, mapping: Mapping | None = None) -> Recording:
 def read_rows(
     path: str | Path, mapping: Mapping | None = None, *, rising: bool = True, extra: Sequence[str] = ()
 ) -> Rows:
-    """Read the rows of a file."""
+    """Read the rows of a file, converted to house units but not yet cleaned."""
     source = Path(path)
     try:
         return _read_rows(source, mapping or Mapping(), rising=rising, extra=extra)
@@ -214,7 +214,7 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
 
 
 def _as_written(name: str, *, as_text: bool) -> str:
-    """Return a heading or a label such that reading restores it, and in text such that no spreadsheet evaluates it."""
+    """Return a heading or label to write: reading restores it, and in a text file no spreadsheet evaluates it."""
     return defuse(name) if as_text or restore(name) != name else name
 
 
@@ -236,7 +236,7 @@ def _later(start: str, seconds: float) -> str:
 
 @contextmanager
 def _guessing(table: FileTable, mapping: Mapping) -> Iterator[None]:
-    """Add guesses about the columns to errors about columns."""
+    """Add suggested mapping entries, guessed from names and values, to an error about columns."""
     try:
         yield
     except RecordingError as e:

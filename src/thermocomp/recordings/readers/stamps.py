@@ -35,7 +35,7 @@ _WORDS = {"dmy": "day/month/year", "mdy": "month/day/year", "ymd": "year/month/d
 
 
 class Parsed(NamedTuple):
-    """Timestamps, and their interpretation."""
+    """Timestamps as read from their cells, and the start time."""
 
     stamps: "pd.Series[pd.Timestamp]"  #: in UTC; NaT where a cell is not a timestamp
     start: str  #: the first one in ISO 8601, in the local time of its clock
@@ -238,7 +238,7 @@ def _orders(shape: re.Match[str]) -> list[str]:
 
 
 def _format(shape: re.Match[str], order: str) -> str:
-    """Return the format of simplified cells."""
+    """Return the format that matches the simplified cells."""
     digits = shape["c" if order[2] == "y" else "a"]
     letters = {"d": "%d", "m": "%m", "y": "%Y" if len(digits) == 4 else "%y"}
     form = f"{letters[order[0]]}{shape['sep']}{letters[order[1]]}{shape['sep2']}{letters[order[2]]}"

@@ -229,7 +229,7 @@ class _Head(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """Result of a pass over all lines of a file."""
+    """Results of reading all lines of a file once."""
 
     skipped: list[int]  #: line numbers of lines that are not rows (0-based)
     width: int
@@ -254,7 +254,7 @@ def _read_head(lines: Lines) -> _Head:
 
 
 def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, bytes]]:
-    """Return the first lines: at least a few, whatever their length."""
+    """Return the first lines of a file: at least a few, whatever their length."""
     found: list[tuple[int, bytes]] = []
     size = 0
     for number, line in content:

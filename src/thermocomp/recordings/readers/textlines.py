@@ -43,7 +43,7 @@ class Lines:
     returns: bool
 
     def open(self) -> BinaryIO:
-        """Open the file."""
+        """Open the file, or its content after conversion to UTF-8, in binary mode."""
         return self.path.open("rb") if self.data is None else BytesIO(self.data)
 
     def content(self, skipped: list[int]) -> Iterator[tuple[int, bytes]]:
@@ -113,7 +113,7 @@ class Lines:
 
 
 def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: FileLimits) -> Lines:
-    """Check that a file is text."""
+    """Check that a file contains text, and return its lines."""
     returns, last = 0, b""
     with path.open("rb") if data is None else BytesIO(data) as f:
         while block := f.read(1 << 20):

@@ -146,7 +146,7 @@ def _told(keys: dict[str, str]) -> str:
 
 
 def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
-    """Read times of day, or elapsed times: neither contains the day."""
+    """Read times of day or elapsed times, neither of which contains a date."""
     first = text.iloc[0].strip()
     halves = HALF.fullmatch(first) is not None
     parts = text.str.strip().str.extract(CLOCK)

@@ -173,7 +173,7 @@ class _Body:
             self._pack()
 
     def close(self, before: list[Row]) -> list[Column]:
-        """Return the columns, with the rows `before` at the start."""
+        """Return the columns of the sheet, starting with the rows `before`."""
         self._pack()
         self.rows = before
         self._pack()

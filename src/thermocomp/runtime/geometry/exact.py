@@ -73,7 +73,7 @@ def _moved(machine: Machine, name: str, values: FloatArray, points: FloatArray) 
 
 
 def _three(values: FloatArray, first: str) -> FloatArray:
-    """Return three consecutive components."""
+    """Return three consecutive components, such as the translational errors of an axis."""
     return values[..., INDEX[first] : INDEX[first] + 3]
 
 

@@ -64,7 +64,7 @@ class VolumetricModel:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the required channels."""
+        """Names of the channels that the models need."""
         return self.stack.inputs
 
     def init(self) -> VolumetricState:

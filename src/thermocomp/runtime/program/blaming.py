@@ -1,4 +1,4 @@
-"""Sensor failure that explains the residuals of readings, as scalars and loops: see `thermocomp.runtime.blame`."""
+"""Sensor failure that explains the residuals of readings, with scalars and loops: see `thermocomp.runtime.blame`."""
 
 from thermocomp.runtime.blame import AGAINST, USUAL
 from thermocomp.runtime.program.language import choose, each, let, procedure, when

@@ -1,4 +1,4 @@
-"""Values with a separate clock, as scalars and loops: see `thermocomp.core.expression.Recurrence`."""
+"""Values updated at fixed intervals, with scalars and loops only: see `thermocomp.core.expression.Recurrence`."""
 
 from thermocomp.runtime.program.formulas import tick
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, repeat_while, when

@@ -1,4 +1,4 @@
-"""Distance of inputs from the training data of a model, as scalars and loops: see `thermocomp.core.joint`."""
+"""Distance of inputs from the training data of a model, with scalars and loops only: see `thermocomp.core.joint`."""
 
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, sqrt, when
 from thermocomp.runtime.program.numbers import larger, smaller

@@ -7,14 +7,14 @@ from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 @procedure
 def models_absolute(s: Kept, w: Work, t: Constants) -> None:
-    """Compute the deviations of the models without inputs relative to the start."""
+    """Compute the deviations of the models whose inputs are not relative to the start."""
 
 
 @procedure
 def models_rezeroed(s: Kept, w: Work, t: Constants) -> None:
-    """Compute the deviations of the models with inputs relative to the start."""
+    """Compute the deviations of the models whose inputs are relative to the start."""
 
 
 @procedure
 def tick(s: Kept, w: Work, t: Constants, c: Whole) -> None:
-    """Compute a value with a separate clock at its next tick."""
+    """Compute a value that is updated at fixed intervals at its next tick."""

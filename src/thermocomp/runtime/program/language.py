@@ -1,8 +1,8 @@
-"""A typed language for programs of scalars and loops that is written in Python and recorded as a tree.
+"""A typed language within Python for programs of scalars and loops, which are recorded as a tree.
 
 A function of a program runs once, with symbols instead of numbers: assignments to variables, ``with when(...)``,
 ``for k in each(...)`` and calls of other functions of the program are recorded (`thermocomp.runtime.program.tree`). A
-type checker sees numbers, integers, conditions and arrays; what it cannot see is rejected while recording.
+type checker sees numbers, integers, conditions and arrays; errors that it cannot detect are rejected while recording.
 """
 
 import inspect
@@ -53,7 +53,7 @@ def when(test: Condition) -> Iterator[None]:
 
 
 def _last_branch() -> n.If:
-    """Return the last branch of the present block, at the end of its chain."""
+    """Return the last branch of the ``if`` chain that ends the current block of statements."""
     last = TRACE.get().blocks[-1][-1]
     while isinstance(last, n.If) and last.other:
         last = last.other[0]
@@ -101,7 +101,7 @@ def repeat_while(test: Condition) -> Iterator[None]:
 
 
 def choose(test: Condition, one: Number | float, other: Number | float) -> Number:
-    """Return one of two numbers."""
+    """Return a conditional expression: one number if a condition holds, else another."""
     pair = real(one), real(other)
     return Number(n.Conditional(common_kind(*pair), test.node, pair[0].node, pair[1].node))
 
@@ -148,7 +148,7 @@ _KNOWN: dict[str, Callable[..., object]] = {}
 
 
 def _nodes(args: Iterable[object]) -> tuple[n.Expression, ...]:
-    """Return the arguments other than the records."""
+    """Return the expressions of a call's arguments, without the records of variables."""
     return tuple(a.node for a in args if isinstance(a, Symbol))
 
 
@@ -196,7 +196,7 @@ def record(name: str) -> Iterator[n.Function]:
 
 @cache
 def find_function(name: str) -> n.Function:
-    """Return a function of the program."""
+    """Return the recorded tree of a function of the program."""
     written = _KNOWN[name]
     given: list[object] = []
     parameters: dict[str, Kind] = {}

@@ -15,10 +15,10 @@ IntArray = NDArray[np.int64]
 
 
 class Location(NamedTuple):
-    """Where a variable stands."""
+    """Location of a variable in the flat arrays."""
 
     array: str  #: letter of its record, then ``r`` for real numbers or ``i`` for integers
-    place: int  #: of a number in this array; of an array in ``at``, where its first element is found
+    place: int  #: index of a number in this array; for an array, index into ``at``, which gives its first element
 
 
 def letter_of(kind: Kind) -> str:
@@ -32,7 +32,7 @@ def _dimensions() -> list[str]:
     return list(dict.fromkeys([*options, *dims]))
 
 
-#: place of each size and option of a compensator
+#: index of each size and option of a compensator
 SIZES: dict[str, int] = {name: k for k, name in enumerate(_dimensions())}
 #: arrays of a program, in the order of its arguments
 ARRAYS = (*(f"{letter}{kind}" for letter in RECORDS for kind in "ri"), "at", "sizes")
@@ -40,7 +40,7 @@ ARRAYS = (*(f"{letter}{kind}" for letter in RECORDS for kind in "ri"), "at", "si
 
 @cache
 def find_places() -> dict[tuple[str, str], Location]:
-    """Return the place of each variable, by record and name."""
+    """Return the location of each variable in the flat arrays, by record and name."""
     found: dict[tuple[str, str], Location] = {}
     counts, arrays = dict.fromkeys(ARRAYS, 0), 0
     for letter, record in RECORDS.items():

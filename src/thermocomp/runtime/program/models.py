@@ -1,4 +1,4 @@
-"""Formulas of models as functions of a program: one variable per node, with lags and clocks in the state."""
+"""Formulas of models as functions of a program: one variable per node, with lags and ticks in the state."""
 
 from collections.abc import Iterable, Sequence
 from functools import reduce
@@ -19,7 +19,7 @@ from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 #: beyond every argument of a table
 _BEYOND = 1e30
-#: a larger exponent is left to a library, which may reject a negative base
+#: powers with a larger exponent are computed by a library function, which may reject a negative base
 _FACTORS = 16
 
 
@@ -101,7 +101,7 @@ class _Arithmetic:
         self._known: dict[e.Node, Number] = {}
 
     def value(self, node: e.Node) -> Number:
-        """Return the value of a node."""
+        """Return the value of an expression's node, computed once."""
         if isinstance(node, e.Named):
             return self.value(node.of)
         if isinstance(node, e.Constant):
@@ -133,7 +133,7 @@ class _Arithmetic:
 
 
 class _Formula(_Arithmetic):
-    """Formula of models, with lags, tables and clocks."""
+    """Formula of models, with lags, tables and values updated at fixed intervals."""
 
     def __init__(self, formulas: Formulas, begun: Condition) -> None:
         super().__init__()
@@ -177,7 +177,7 @@ class _Formula(_Arithmetic):
 
 
 class _Clock(Clock):
-    """A value with a separate clock, and the location of its past values in the arrays of the program."""
+    """A value updated at fixed intervals, and the location of its past values in the arrays of the program."""
 
     def __init__(self, tick: e.Node, interval: float, before: Sequence["_Clock"]) -> None:
         super().__init__(tick, interval)
@@ -187,7 +187,7 @@ class _Clock(Clock):
 
 
 class _Ticking(_Arithmetic):
-    """Expression of a clock's next value."""
+    """Expression of the next value of a recurrence."""
 
     def __init__(self, clock: _Clock) -> None:
         super().__init__()

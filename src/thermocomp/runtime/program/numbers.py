@@ -1,4 +1,4 @@
-"""Means, medians and lags as scalars and loops, in the array ``column`` of the working memory."""
+"""Means, medians and lags with scalars and loops only, in the array ``column`` of the working memory."""
 
 from thermocomp.core.zero import FAR
 from thermocomp.runtime.program.language import (
@@ -57,7 +57,7 @@ def find_mean(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def sort(s: Kept, w: Work, t: Constants) -> None:
-    """Sort the column in ascending order."""
+    """Sort the array ``column`` in ascending order."""
     gap = let("gap", w.rows // 2)
     with repeat_while(gap > 0):
         for k in each("k", gap, w.rows):
@@ -88,13 +88,13 @@ def larger(one: Number, other: Number) -> Number:
 
 @function
 def follow(lag: Number, value: Number, paces: Number) -> Number:
-    """Return a first-order lag after a number of time constants."""
+    """Return the output of a first-order lag after a time given in time constants."""
     return lag - expm1(-paces) * (value - lag)
 
 
 @function
 def clip(value: Number, low: Number, high: Number) -> Number:
-    """Return a value between two bounds."""
+    """Return a value clipped to a lower and an upper bound."""
     return choose(value < low, low, choose(value > high, high, value))
 
 

@@ -32,48 +32,48 @@ class Printer(ABC):
 
     @abstractmethod
     def statement(self, node: Statement, depth: int) -> list[str]:
-        """Return the lines of a statement."""
+        """Return a statement of the program as lines of text."""
 
     @abstractmethod
     def constant(self, value: float, kind: Kind) -> str:
-        """Return a numeric constant."""
+        """Return a numeric constant as text."""
 
     @abstractmethod
     def variable(self, record: str, name: str) -> str:
-        """Return a variable of a record; a size is printed as a number."""
+        """Return a variable of a record as text; a size is printed as a number."""
 
     @abstractmethod
     def choice(self, test: str, one: str, other: str) -> str:
-        """Return a conditional expression: one of two values."""
+        """Return a conditional expression, which selects one of two values, as text."""
 
     @abstractmethod
     def negated(self, text: str) -> str:
-        """Return the negation of a condition."""
+        """Return the negation of a condition as text."""
 
     @abstractmethod
     def call(self, name: str, arguments: Sequence[Expression]) -> str:
-        """Return a call of a numeric function."""
+        """Return a call of a numeric function as text."""
 
     def local(self, name: str) -> str:
-        """Return a local variable of the function."""
+        """Return a local variable of the function as text."""
         return name
 
     def element(self, array: n.Name, at: Sequence[Expression]) -> str:
-        """Return an element of an array."""
+        """Return an element of an array as text."""
         return self.value(array) + "".join(f"[{self.bare(a)}]" for a in at)
 
     def real(self, text: str) -> str:
-        """Return an integer as a real number."""
+        """Return the conversion of an integer to a real number as text."""
         return text
 
     def bare(self, node: Expression, kind: Kind | None = None) -> str:
-        """Return an expression without outer parentheses."""
+        """Return an expression as text, without outer parentheses."""
         text = self.value(node, kind)
         outer = text.startswith("(") and isinstance(node, n.Operation | n.Conditional)
         return text[1:-1] if outer else text
 
     def value(self, node: Expression, kind: Kind | None = None) -> str:  # noqa: PLR0911 - one case per node type
-        """Return an expression; a real constant is written as a time if `kind` is ``time``."""
+        """Return an expression as text; a real constant is written as a time if `kind` is ``time``."""
         match node:
             case n.Numeral(own, value):
                 return self.constant(value, "time" if own == "real" and kind == "time" else own)

@@ -1,4 +1,4 @@
-"""Processing chain of a reading as scalars and loops: exported to controllers in any language.
+"""Processing chain of a reading with scalars and loops only: exported to controllers in any language.
 
 Equivalent to `thermocomp.runtime.compensator` for models whose zero is the start, without probings and commands. The
 functions are written in the language `thermocomp.runtime.program.language`, on three groups of variables: ``s``, kept
@@ -32,7 +32,7 @@ UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 @procedure
 def step(s: Kept, w: Work, t: Constants) -> None:
-    """Process values of a given age, and move the corrections."""
+    """Process a reading of a given age, and move the corrections."""
     tell_time(s, w, t)
     for c in each("c", t.CHANNELS):
         w.given[c] = (w.value[c] >= -1e30) & (w.value[c] <= 1e30)  # False for NaN

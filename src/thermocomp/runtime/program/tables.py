@@ -1,4 +1,4 @@
-"""Numbers of a compensator, as constants of its program: see `thermocomp.runtime.program.variables`."""
+"""Numbers of a compensator as constants of its program: see `thermocomp.runtime.program.variables`."""
 
 from typing import Any, NamedTuple
 
@@ -17,12 +17,12 @@ from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
 
-#: any number, in single precision too
+#: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
 
 
 class Tables(NamedTuple):
-    """Source data of a block."""
+    """Constants and formulas from which the program of a compensator is generated."""
 
     channels: tuple[Input, ...]  #: in the order of the block's input values
     ranges: tuple[Input, ...]  #: inputs of the models, without duplicates
@@ -37,7 +37,7 @@ class Tables(NamedTuple):
 
 
 def gather(compensator: Compensator) -> Tables:
-    """Return the numbers of a compensator.
+    """Return the constants and formulas of a compensator.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _channels(known: list[Input], speed: str) -> tuple[Input, ...]:
 
 
 def _sizes(values: dict[str, Any]) -> dict[str, int]:
-    """Return the sizes of the lists among the values."""
+    """Return the sizes and flags that follow from the lists among the constants."""
     return {
         "SETS": len(values["set_begin"]) - 1,
         "ENDS_OF_SETS": len(values["set_begin"]),

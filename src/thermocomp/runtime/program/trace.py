@@ -1,4 +1,4 @@
-"""The function of a program that is being recorded."""
+"""The function of a program that is being recorded, and its statements so far."""
 
 from contextvars import ContextVar
 
@@ -6,7 +6,7 @@ from thermocomp.runtime.program.tree import Kind, Statement
 
 
 class Trace:
-    """The function that is being recorded."""
+    """Statements and local variables of the function that is being recorded."""
 
     def __init__(self) -> None:
         self.blocks: list[list[Statement]] = [[]]
@@ -17,5 +17,5 @@ TRACE: ContextVar[Trace] = ContextVar("recording")
 
 
 def add(statement: Statement) -> None:
-    """Add a statement to the present block."""
+    """Append a statement to the block that is being recorded."""
     TRACE.get().blocks[-1].append(statement)

@@ -11,7 +11,7 @@ Operator = Literal["+", "-", "*", "/", "//", "%", "==", "!=", "<", "<=", ">", ">
 
 @dataclass(frozen=True)
 class Numeral:
-    """A number."""
+    """A numeric constant of the program."""
 
     kind: Kind
     value: float
@@ -62,7 +62,7 @@ class Real:
 
 @dataclass(frozen=True)
 class Operation:
-    """Two values combined by an operator; ``and`` and ``or`` evaluate the second only if it decides."""
+    """Two values combined by an operator; ``and`` and ``or`` evaluate the second only if the first does not decide."""
 
     kind: Kind
     operator: Operator
@@ -72,7 +72,7 @@ class Operation:
 
 @dataclass(frozen=True)
 class Conditional:
-    """One of two values; only the chosen one needs to be defined."""
+    """Conditional expression: one of two values, of which only the selected one needs to be defined."""
 
     kind: Kind
     test: "Expression"
@@ -94,7 +94,7 @@ Expression = Numeral | Name | Element | Negative | Not | Real | Operation | Cond
 
 @dataclass(frozen=True)
 class Assign:
-    """A variable or an element gets a value."""
+    """Assignment of a value to a variable or to an element of an array."""
 
     target: Name | Element
     value: Expression
@@ -102,7 +102,7 @@ class Assign:
 
 @dataclass(frozen=True)
 class ProcedureCall:
-    """A procedure is called with the records and further arguments."""
+    """Call of a procedure with the records and further arguments."""
 
     name: str
     arguments: tuple[Expression, ...]
@@ -110,7 +110,7 @@ class ProcedureCall:
 
 @dataclass(frozen=True)
 class If:
-    """A branch."""
+    """Conditional statement, with an optional else branch."""
 
     test: Expression
     body: list["Statement"]
@@ -137,7 +137,7 @@ class While:
 
 @dataclass(frozen=True)
 class Return:
-    """End of a function of numbers."""
+    """Return statement of a function of numbers."""
 
     value: Expression
 

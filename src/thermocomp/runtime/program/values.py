@@ -1,4 +1,4 @@
-"""Symbols of a program while it is recorded: numbers, integers, conditions and arrays that a type checker sees."""
+"""Symbols of a program while it is recorded: numbers, integers, conditions and arrays, typed for a type checker."""
 
 from abc import abstractmethod
 from typing import Any, Generic, NoReturn, Self, TypeVar, cast
@@ -26,7 +26,7 @@ class Symbol:
 
 
 class Condition(Symbol):
-    """A condition; ``&`` and ``|`` evaluate their right side only if it decides."""
+    """A condition; ``&`` and ``|`` evaluate their right side only if the left side does not decide the result."""
 
     def __and__(self, other: "Condition") -> "Condition":
         return Condition(n.Operation("bool", "and", self.node, other.node))
@@ -38,7 +38,7 @@ class Condition(Symbol):
         return Condition(n.Not("bool", self.node))
 
     def equals(self, other: "Condition") -> "Condition":
-        """Return the condition that both hold, or neither."""
+        """Return the condition that two conditions have the same truth value."""
         return Condition(n.Operation("bool", "==", self.node, other.node))
 
     def set(self, value: "Condition | bool") -> None:
@@ -47,12 +47,12 @@ class Condition(Symbol):
 
 
 class Ordered(Symbol, Generic[P]):
-    """A number or an integer, and what both can do; a plain number is made an expression."""
+    """Common operations of numbers and integers; a plain number is converted to an expression."""
 
     @staticmethod
     @abstractmethod
     def _made(value: Any) -> Symbol:
-        """Return a value as an expression."""
+        """Return a plain number, or a symbol, as a symbol."""
 
     def _with(self, operator: Operator, other: Self | P, *, swapped: bool = False) -> Self:
         one, two = (self._made(other), self) if swapped else (self, self._made(other))
@@ -83,11 +83,11 @@ class Ordered(Symbol, Generic[P]):
         return self._compared(">=", other)
 
     def equals(self, other: Self | P) -> Condition:
-        """Return the condition that both are equal."""
+        """Return the condition that two numbers are equal."""
         return self._compared("==", other)
 
     def differs(self, other: Self | P) -> Condition:
-        """Return the condition that the two are not equal."""
+        """Return the condition that two numbers are not equal."""
         return self._compared("!=", other)
 
     def set(self, value: Self | P) -> None:
@@ -96,7 +96,7 @@ class Ordered(Symbol, Generic[P]):
 
 
 class Whole(Ordered[int]):
-    """An integer."""
+    """An integer of the program."""
 
     @staticmethod
     def _made(value: "Whole | int") -> "Whole":
@@ -110,7 +110,7 @@ class Whole(Ordered[int]):
 
     @property
     def real(self) -> "Number":
-        """The same as a real number."""
+        """The integer converted to a real number."""
         return Number(n.Real("real", self.node))
 
 
@@ -144,7 +144,7 @@ class Number(Ordered[float]):
 
 
 def flag(value: Condition | bool) -> Condition:
-    """Return a condition, or a truth value as one."""
+    """Return a condition, or a Boolean converted to a condition."""
     return value if isinstance(value, Condition) else Condition(n.Numeral("bool", value))
 
 

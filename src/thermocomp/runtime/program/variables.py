@@ -1,4 +1,4 @@
-"""Kept, working memory and constants of the program of a compensator."""
+"""Persistent variables, working memory and constants of the program of a compensator."""
 
 from thermocomp.runtime.program.declarations import (
     Record,
@@ -254,7 +254,7 @@ class Constants(Record):
 
 
 class TestRows(Record):
-    """Readings of a test, row by row, and what becomes of them."""
+    """Readings of a test and their results, row by row."""
 
     owner = "r"
 

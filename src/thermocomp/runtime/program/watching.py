@@ -1,4 +1,4 @@
-"""Monitoring of the temperatures as scalars and loops: see `thermocomp.runtime.watch` for explanations."""
+"""Monitoring of the temperatures with scalars and loops only: see `thermocomp.runtime.watch` for explanations."""
 
 from thermocomp.core.watch import FASTER, LASTING
 from thermocomp.runtime.blame import USUAL
@@ -27,7 +27,7 @@ HOLDING = 2
 
 @procedure
 def believe(s: Kept, w: Work, t: Constants) -> None:
-    """Replace each temperature that is not trusted."""
+    """Replace each temperature that is not trusted by its substitute."""
     w.made = True
     for k in each("k", t.SPEEDS):
         c = let("c", t.watch_channel[t.speed_input[k]])
@@ -139,7 +139,7 @@ def predict(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def look(s: Kept, w: Work, t: Constants) -> None:
-    """Check all sensors and advance the predictions."""
+    """Check all temperature sensors and advance their predictions."""
     elapsed = let("elapsed", w.now - s.look)
     s.look = w.now
     find_jumps(s, w, t, elapsed)
@@ -241,7 +241,7 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def find_off(s: Kept, w: Work, t: Constants) -> None:
-    """Find differences that have been too large for too long."""
+    """Find sensors whose difference from the prediction has been too large for too long."""
     rested = let("rested", ~s.was_fast | (w.now - s.fast > REST))
     for i in each("i", t.SENSORS):
         with when((s.fault[i] > MISSING) & (w.now - s.since[i] <= REST)):

@@ -14,7 +14,7 @@ from thermocomp.virtual.protocol import Experiment
 
 
 def files_of(output: Path, given: Mapping[str, Any]) -> list[Path]:
-    """Return the file of each test of an experiment."""
+    """Return the path of the output file for each test of an experiment."""
     return _number(output, len(find_experiment(given["experiment"]).names))
 
 

@@ -156,7 +156,7 @@ def _refuse_unsorted(table: CsvTable, column: int, rows: Sequence[int], position
 
 
 def _find(table: CsvTable, role: str) -> int | None:
-    """Return the column with a role."""
+    """Return the index of the column with a role, such as position or deviation; None if there is none."""
     fitting = [k for k, h in enumerate(table.headings) if _name(h) in NAMES[role]]
     if not fitting:
         # x_mm, Y_mm: position of an axis
@@ -173,7 +173,7 @@ def _find(table: CsvTable, role: str) -> int | None:
 
 
 def _name(heading: str) -> str:
-    """Return a heading without its unit, as one word."""
+    """Return a heading without its unit, in lower case and as one word."""
     bare = re.sub(r"\s*[\[(].*[\])]\s*$", "", heading)
     meaning = understand(heading) if bare == heading else None
     return "_".join((meaning.base if meaning is not None else bare).casefold().split())
@@ -185,7 +185,7 @@ def _axis(heading: str) -> str:
 
 
 def _unit(table: CsvTable, column: int, role: str) -> Unit:
-    """Return the unit stated in a heading."""
+    """Return the unit in the heading of a column."""
     heading = table.headings[column]
     found = re.search(r"[\[(](.*)[\])]\s*$", heading)
     symbol = found[1].strip() if found else heading.rpartition("_")[2] if "_" in heading else ""

@@ -55,9 +55,9 @@ def study(
 ) -> PositionStudy:
     """Judge the modelling of a position-dependent error on unseen cycles, then fit it to all data.
 
-    In each split everything is learned again: open settings, cold profile, its order, slopes. If only part of a test is
-    left out, its cold profile is the zero of the test: it is used, and not judged. A test left out as a whole is judged
-    with the cold profiles of the other tests.
+    In each split everything is determined again: open settings, cold profile, its order, slopes. If only part of a test
+    is left out, its cold profile is the zero of the test: it is used, and not judged. A test left out as a whole is
+    judged with the cold profiles of the other tests.
 
     Parameters
     ----------

@@ -71,7 +71,8 @@ class PositionAssessment:
         Verdict of the do-no-harm gate: compared with no compensation and, if there is a thermal part, with the cold
         profile alone; by cycles or, if files were left out, by files.
     factors : tuple of HonestError
-        Errors of the model of each factor on the same states [unit/m^i]; verdict and reason are those of the whole.
+        Errors of the model of each factor on the same states [unit/m^i]; verdict and reason are those of the complete
+        model.
     """
 
     protocol: str

@@ -61,7 +61,7 @@ class PointCourse:
 
     @property
     def largest(self) -> int:
-        """Row with the largest error."""
+        """Index of the row with the largest error of the tool tip."""
         return int(np.argmax(np.linalg.norm(self.error, axis=-1)))
 
     def contributions(self, row: int) -> FloatArray:
@@ -99,7 +99,7 @@ class Moment:
 
     @property
     def name(self) -> str:
-        """Label, with the time unless the label is a time."""
+        """Label of the state, with its time unless the label is a time."""
         picked = self.label in _PICKED
         return f"{self.label}, {self.time / 3600:.2f} h" if picked else self.label
 
@@ -165,7 +165,7 @@ class Volumetric:
 
     @property
     def worst(self) -> Moment:
-        """The moment with the largest error on the grid."""
+        """The evaluated state with the largest error on the grid."""
         return max(self.moments, key=lambda m: m.straight.before.largest)
 
 
@@ -247,7 +247,7 @@ def in_reference_state(machine: Machine) -> Machine:
 
 
 def inputs_of(machine: Machine) -> dict[str, Input]:
-    """Return the inputs of the machine's models, by name."""
+    """Return the inputs that the machine's models need, by name."""
     return {i.name: i for source in machine.components.values() for m in models_of(source) for i in m.inputs}
 
 
@@ -316,7 +316,7 @@ def _largest(states: ThermalStates, tool: Vector) -> int:
 
 
 def _rows(time: FloatArray, largest: int, hours: Sequence[float]) -> Iterator[tuple[str, int]]:
-    """Yield the moments to evaluate with their labels, each row once."""
+    """Yield the labels and rows of the states to be evaluated, each row once."""
     if len(time) == 1:
         yield "reference state", 0
         return

@@ -16,11 +16,11 @@ from thermocomp.volumetric.models.shapes import Order, PolynomialShape, SplineSh
 
 Kind = Literal["polynomial", "spline"]
 
-#: minimum number of positions between the ends to judge by these alone
+#: minimum number of positions between the ends for cross-validation without the ends
 FEW = 3
 #: A spline through all means is used if its mean square at left-out points is below this share of a polynomial's. With
 #: few positions, leaving one out doubles the spacing and overestimates its error: a larger share is then allowed, and
-#: any share against a constant, which only noise can favour.
+#: any share compared with a constant, which only noise can favour.
 CLEARLY, BARELY, FEW_POSITIONS = 0.5, 1.25, 8
 #: significance level of the test whether a fit leaves more than the scatter of repeated values
 LEVEL = 0.01
@@ -28,14 +28,15 @@ LEVEL = 0.01
 
 @dataclass(frozen=True)
 class Tried:
-    """A candidate profile.
+    """A candidate for the profile of an error component.
 
     Parameters
     ----------
     order : (int, int)
         Polynomial: degree in the axis' own coordinate and in the others. Spline: number of inner knots, and 0.
     left_out : float
-        RMS error at points left out in turn [unit]; inf if the remaining points do not determine the profile.
+        Cross-validation error (RMS), with each point left out in turn [unit]; inf if the remaining points do not
+        determine the profile.
     margin : float
         Standard error of the mean square [unit^2].
     misfit : float
@@ -89,7 +90,7 @@ class ProfileFit:
 
     @property
     def words(self) -> str:
-        """Return cautions on the fit; empty if there are none."""
+        """Return cautions about the fit of the profile, as text; empty if there are none."""
         if self.leaves_more:
             return (
                 f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
@@ -111,8 +112,8 @@ def fit_profile(
     Without a given order, the candidates are those with at most two thirds as many terms as points. Each point between
     the ends of the axis' travel is left out in turn, with all its values, and predicted from the others; of the orders
     whose mean square is within one standard error of the smallest, the one with the fewest terms is used. The ends are
-    not left out: a profile is never used beyond them, and extrapolation there would dominate the choice. Only with
-    fewer than three positions between them, too few to judge by, are the ends left out too.
+    not left out: a profile is never used beyond them, and extrapolation there would dominate the choice. If there are
+    fewer than three positions between the ends, the ends are left out as well.
 
     If points are repeated, the noise is known: orders whose residual clearly exceeds it are not used (`LEVEL`).
 
@@ -231,7 +232,7 @@ def _misfit(left: FloatArray, values: FloatArray, place: NDArray[np.intp], n_ter
 
 
 def _left_out(points: FloatArray, place: NDArray[np.intp], axis: str) -> NDArray[np.intp]:
-    """Return the places to leave out, which are those between the ends."""
+    """Return the points to leave out in turn: those between the ends."""
     own = points[:, "XYZ".index(axis)]
     inside = (own > own.min()) & (own < own.max())
     return np.unique(place[inside] if len(np.unique(own[inside])) >= FEW else place)

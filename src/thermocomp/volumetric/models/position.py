@@ -208,7 +208,7 @@ def _with_factors(test: Profiles, slopes: Slopes, names: Sequence[str], options:
 
 
 def _cold_inputs(samples: Samples, rows: NDArray[np.intp]) -> FloatArray:
-    """Return the reference values of the inputs."""
+    """Return the values of the inputs in the cold state, to which they are relative."""
     values = samples.values[rows]
     there = np.isfinite(values)
     counted = np.array([c.quantity == "temperature" for c in samples.inputs])
@@ -248,7 +248,7 @@ def _coefficient_errors(
 
 
 def _profile_alone(samples: Samples, seen: BoolArray) -> Provenance:
-    """Return the provenance of a model without factors."""
+    """Return the provenance of a position model that consists of a cold profile only."""
     tests: Sequence[int] = np.unique(samples.test[seen]).tolist()
     return Provenance(
         method="cold profile alone",

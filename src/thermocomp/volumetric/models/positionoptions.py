@@ -47,7 +47,7 @@ class PositionOptions:
     reference_position : float, optional
         Position at which q is zero [mm]. Default: axis position 0, or the end of the measured travel nearest to it.
     rezero : bool
-        False: all tests refer to one cold state, the mean of their reference states, and so does the live model:
+        False: all tests refer to one cold state, the mean of their reference states, as does the live model:
         temperatures are absolute. For a machine whose cold profile differs from morning to morning.
     support : Support
         Behaviour of the models of the slopes outside their training range.
@@ -71,7 +71,7 @@ class PositionOptions:
 
     @property
     def powers(self) -> tuple[int, ...]:
-        """Powers of q with modelled factors."""
+        """Powers of q whose factors are modelled."""
         return tuple(range(0 if self.offset else 1, self.slopes + 1))
 
 
@@ -86,7 +86,8 @@ def fill_options(
 
     - Reference position: the measured position where the thermal part is smallest, i.e. where powers that vanish there
       leave the smallest residual. A laser reads relative to its zeroing position, a screw grows from its fixed bearing.
-    - Offset: used if the thermal part exceeds the noise even there: it must remove a tenth of the powers' remainder.
+    - Offset: used if the thermal part exceeds the noise even there: it must remove a tenth of the remainder after the
+      powers.
     - Slopes: the fewest powers to which one more adds little, as in `PositionFit.enough`; none if the thermal part is
       noise.
 

@@ -49,11 +49,11 @@ class PolynomialShape:
         return [e for e in possible if sum(e) - e[self.own] <= order[1] and sum(e) <= max(order)]
 
     def columns(self, order: Order) -> FloatArray:
-        """Return the value of each term at each point, (n, n_terms)."""
+        """Return the values of the basis functions at the points, (n, n_terms)."""
         return np.stack([np.prod(self.scaled ** np.array(e), axis=1) for e in self.exponents(order)], axis=1)
 
     def profile(self, order: Order, found: FloatArray) -> PolynomialProfile:
-        """Return the profile with the coefficients found."""
+        """Return the profile with the given coefficients of the basis functions."""
 
         def three(a: FloatArray) -> tuple[float, float, float]:
             return float(a[0]), float(a[1]), float(a[2])
@@ -69,7 +69,7 @@ class PolynomialShape:
 
 
 class _Along:
-    """A profile along its own axis only."""
+    """Common part of the profiles that depend on the position of their own axis only."""
 
     def __init__(self, points: FloatArray, axis: str) -> None:
         self.axis = axis
@@ -81,21 +81,21 @@ class SplineShape(_Along):
     """Cubic spline with inner knots that divide the positions into equal numbers."""
 
     def orders(self, n_places: int) -> Iterator[Order]:  # noqa: ARG002 - only positions along the axis matter
-        """Yield the numbers of knots that leave two degrees of freedom."""
+        """Yield the numbers of inner knots with which at least two degrees of freedom remain."""
         for n in range(min(len(self.places) - 6, MOST_KNOTS) + 1):
             yield n, 0
 
     def knots(self, order: Order) -> FloatArray:
-        """Return all knots, those at the ends four times."""
+        """Return all knots of the spline; those at the ends occur four times."""
         inner = np.quantile(self.places, np.linspace(0, 1, order[0] + 2))
         return np.concatenate([[inner[0]] * 3, inner, [inner[-1]] * 3])
 
     def columns(self, order: Order) -> FloatArray:
-        """Return the value of each term at each point, (n, n_terms)."""
+        """Return the values of the basis functions at the points, (n, n_terms)."""
         return np.asarray(BSpline.design_matrix(self.position, self.knots(order), 3).toarray())
 
     def profile(self, order: Order, found: FloatArray) -> SplineProfile:
-        """Return the profile with the coefficients found."""
+        """Return the profile with the given coefficients of the basis functions."""
         knots = self.knots(order)
         pieces = PPoly.from_spline(BSpline(knots, found, 3))
         return _pieces(self.axis, knots[3:-3], pieces.c[:, 3:-3])
@@ -111,11 +111,11 @@ class ThroughMeans(_Along):
         return CubicSpline(places, means, bc_type="natural")
 
     def columns(self, order: Order) -> FloatArray:  # noqa: ARG002 - there is only one order
-        """Return 1 where a point is at a position, (n, n_positions)."""
+        """Return a matrix with 1 where a point is at a position and 0 elsewhere, (n, n_positions)."""
         return np.asarray(self.position[:, None] == self.places, dtype=np.float64)
 
     def profile(self, order: Order, found: FloatArray) -> SplineProfile:  # noqa: ARG002
-        """Return the profile through the means found."""
+        """Return the profile through the given means of the positions."""
         return _pieces(self.axis, self.places, CubicSpline(self.places, found, bc_type="natural").c)
 
 

@@ -56,7 +56,7 @@ def position(found: PositionStudy, left_open: Sequence[Setting]) -> dict[str, An
 
 
 def cycle(c: CycleErrors) -> dict[str, Any]:
-    """Return the errors of unseen profiles."""
+    """Return the errors of the unseen profiles of a cycle as plain numbers."""
     return {
         "cycle": c.cycle,
         "profiles": c.n_states,

@@ -54,7 +54,7 @@ def components(study: Volumetric, *, page: bool = False) -> Layout:
 
 
 def at_point(study: Volumetric, *, page: bool = False) -> Layout:
-    """Return error and tilt at the point in each state."""
+    """Return a table of the error and the tilt of the tool at the point, in each state."""
     course = study.course
     rows = [
         (m.name, *course.error[m.row], float(np.linalg.norm(course.error[m.row])), *course.tilt[m.row])
@@ -240,5 +240,5 @@ def unproven(study: Volumetric) -> list[str]:
 
 
 def said(point: Vector) -> str:
-    """Return a point as text."""
+    """Return the axis positions of a point as text."""
     return "X {:g}, Y {:g}, Z {:g} mm".format(*point)

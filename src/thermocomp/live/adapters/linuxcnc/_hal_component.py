@@ -84,7 +84,7 @@ class Server:
         self.pins.ready()
 
     def run(self) -> None:
-        """Run until LinuxCNC ends."""
+        """Serve connections and update the pins until LinuxCNC ends."""
         due = time.monotonic()
         while True:
             for key, _ in self.selector.select(max(0.0, due - time.monotonic())):
@@ -208,14 +208,14 @@ class Server:
             return True
 
     def drop(self) -> None:
-        """Disconnect the service."""
+        """Close the connection to the service."""
         if self.client is not None:
             self.selector.unregister(self.client)
             self.client.close()
             self.client = None
 
     def receive(self) -> None:
-        """Receive messages and answer them."""
+        """Receive messages from the service and answer each."""
         client = self.client
         assert client is not None
         try:
@@ -235,7 +235,7 @@ class Server:
             self.drop()
 
     def take(self, message: dict[str, Any]) -> dict[str, Any]:
-        """Process a message completely or not at all."""
+        """Apply a message of the service completely, or reject it."""
         limits = {}
         for name in ("magnitude", "rate"):
             value = float(message.get(name, getattr(self.options, name)))
@@ -333,7 +333,7 @@ def keep(arguments: list[str]) -> None:
 
 
 def main() -> None:
-    """Run the component."""
+    """Parse the arguments and run the component."""
     parser = argparse.ArgumentParser(description="The thermocomp component inside LinuxCNC.")
     parser.add_argument("--pattern", choices=("offset", "drive"), required=True)
     parser.add_argument("--axis", action="append", required=True, help="letter,low,high: z,-200,100 [units of the INI]")

@@ -22,7 +22,7 @@ LONGEST = 107
 
 @dataclass(frozen=True, kw_only=True)
 class HalSettings:
-    """Limits of a correction inside LinuxCNC, regardless of the service.
+    """Limits of a correction inside LinuxCNC, whatever the service sends.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class HalSettings:
 
 
 class HalSetup(NamedTuple):
-    """Result of `prepare`."""
+    """Files and settings for corrections of a machine, as returned by `prepare`."""
 
     hal: str  #: text of the HAL file
     component: str  #: text of the component

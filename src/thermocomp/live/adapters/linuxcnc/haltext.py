@@ -12,7 +12,7 @@ _INPUTS = 4
 
 
 class HalAxis(NamedTuple):
-    """An axis, in machine units."""
+    """A corrected axis: joint, travel, speed and acceleration, in machine units."""
 
     letter: str
     joint: int  #: joint number; -1: not needed

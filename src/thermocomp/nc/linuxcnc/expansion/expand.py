@@ -37,7 +37,7 @@ MOST = 2_000_000
 
 @dataclass(frozen=True)
 class Expansion:
-    """Output of `expand`.
+    """Plain program written by `expand`.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ class _Around:
         return {"inch": bool(self.inch), "block_delete": self.block_delete, "subroutines": self.subroutines}
 
     def run(self, path: Path, stored: Stored, **more: Any) -> Generator[Canonical]:
-        """Run a program in this environment."""
+        """Run a program in this environment, in a controller with the given stored values."""
         return read(path, stored, **self.settings, **more)
 
     def controller(self, seed: int) -> Stored:
-        """Return a simulated controller; different seeds share only the specified settings."""
+        """Return the state of a simulated controller; states of different seeds share only the specified settings."""
         stored = draw_controller(seed, self.startup or "")
         return replace(stored, diameters={**stored.diameters, **self.diameters}, system=self.systems[seed])
 
@@ -227,7 +227,7 @@ def _code(text: str) -> str:
 
 
 def _first(path: Path) -> str:
-    """Return the first line that is not empty."""
+    """Return the first line of a program that is not empty."""
     with path.open(encoding="latin-1") as file:
         return next((line.strip() for line in file if line.strip()), "")
 

@@ -16,7 +16,7 @@ STILL = 1e-8  #: an axis that moves less is at rest [mm]
 
 
 def agree(first: float, second: float) -> bool:
-    """Return whether the values of two runs agree."""
+    """Return whether the values of two runs agree within `EQUAL`."""
     return abs(first - second) < EQUAL
 
 
@@ -74,7 +74,7 @@ class Side:
         self.rotations = {i: stored.rotations.get(i, 0.0) for i in stored.origins}
 
     def begin(self, call: Canonical) -> None:
-        """Process a call before the first line."""
+        """Process a call that precedes the first line of the program."""
         self.take(call.kind, call.values)
         if call.kind == "rapid":
             self.move(call.program)
@@ -84,7 +84,7 @@ class Side:
         self.program, self.machine = program, self.frame.machine(program)
 
     def take(self, kind: str, values: tuple[float, ...]) -> None:
-        """Apply an offset without moving the machine."""
+        """Apply a new offset: the machine position is unchanged, the program position changes."""
         self.frame.take(kind, values)
         self.program = self.frame.program(self.machine)
 
@@ -195,7 +195,7 @@ class OriginWriter:
         return f"G92 {' '.join(named)}" if named else f"G52 {' '.join(fixed)}" if fixed else ""
 
     def tool_length(self) -> str:
-        """Return the line that activates the tool length of both sides."""
+        """Return the line that activates the tool length in force in both runs."""
         first, second = (side.frame.length for side in self.sides)
         if not (any(first) or any(second)):
             return "G49"

@@ -112,7 +112,7 @@ class Writer(OriginWriter):
     def release(  # noqa: PLR0911
         self, held: Canonical, other: Canonical, a: Canonical, b: Canonical
     ) -> tuple[list[tuple[str, str]], bool]:
-        """Return (kind, text) of a pair held back, and whether the next pair belongs to it."""
+        """Return the lines (kind, text) for a pair of calls held back, and whether the next pair is merged into it."""
         kind, close = held.kind, a.line == held.line
         if kind == "g5x":
             if a.kind == "g92" and close and self.unshifted(a, b):
@@ -140,12 +140,12 @@ class Writer(OriginWriter):
         return [("g10", self.plain_g10("" if held.file else self.source(held.line)))], False
 
     def unshifted(self, a: Canonical, b: Canonical) -> bool:
-        """Return whether G92 is unchanged."""
+        """Return whether the G92 offset is unchanged in both runs."""
         old = (*self.sides[0].frame.shift, *self.sides[1].frame.shift)
         return all(agree(x, y) for x, y in zip((*a.values, *b.values), old, strict=True))
 
     def single(self, a: Canonical, b: Canonical) -> Iterator[tuple[str, str]]:
-        """Yield (kind, text) of a pair of calls."""
+        """Yield the lines for a pair of corresponding calls, each as (kind, text)."""
         kind = a.kind
         if kind in REFUSED or (kind == "user" and not self.user_codes):
             what = REFUSED.get(kind) or f"M{a.values[0]:.0f} is a user-defined code"
@@ -227,7 +227,7 @@ class Writer(OriginWriter):
         second.move(pb)
 
     def tap(self, a: Canonical, b: Canonical) -> str:
-        """Return G33.1, which returns to its start."""
+        """Return the line of a rigid tapping move, G33.1, which returns to its start."""
         words = ""
         for i, (first, second) in enumerate(zip(a.values[:3], b.values[:3], strict=True)):
             if agree(first, second):
@@ -239,12 +239,12 @@ class Writer(OriginWriter):
         return f"G33.1{words} K{self.words.length(self.pitch)}{scale}"
 
     def still(self, axis: int, first: float, second: float) -> bool:
-        """Return whether an axis moves in neither run."""
+        """Return whether a move leaves an axis at rest in both runs."""
         a, b = self.sides
         return abs(first - a.program[axis]) < STILL and abs(second - b.program[axis]) < STILL
 
     def code(self, call: Canonical) -> str:
-        """Return G0, G1 or G33."""
+        """Return the motion code of a linear move: G0, G1 or G33."""
         if call.kind == "rapid":
             return "G0"
         if self.pitch:
@@ -323,7 +323,7 @@ class Writer(OriginWriter):
         return f"{'G5.1' if order == 3 else 'G5'} {' '.join(words)}{self.feed_word(a)}"
 
     def feed_word(self, call: Canonical) -> str:
-        """Return F if the feed has changed, else an empty text."""
+        """Return the F word if the feed has changed, else an empty text."""
         if call.kind == "rapid" or self.pitch:
             return ""
         if self.feed is None:
@@ -334,13 +334,13 @@ class Writer(OriginWriter):
         return f" F{format_number(self.feed)}"
 
     def path(self, values: tuple[float, ...], naive: float) -> str:
-        """Return G61, G61.1 or G64."""
+        """Return the code of the path control mode: G61, G61.1 or G64."""
         if values[0] != 3:
             return "G61" if values[0] == 2 else "G61.1"
         return f"G64 P{self.words.length(values[1])} Q{self.words.length(naive)}" if values[1] or naive else "G64"
 
     def speedmode(self, call: Canonical, speed: float | None) -> str:
-        """Return G96 or G97."""
+        """Return the code of the spindle speed mode: G96 or G97."""
         limit = call.values[1]
         if limit and speed is None:
             raise self.refuse("G96 without S; write S")

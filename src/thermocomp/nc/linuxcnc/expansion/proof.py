@@ -36,7 +36,7 @@ class Act(NamedTuple):
     text: str
 
     def told(self) -> str:
-        """Return the action as text."""
+        """Return the action of the machine as text, for messages."""
         return f"{self.kind} {' '.join(f'{n:.6f}' for n in self.numbers)} {self.text}".strip()
 
 

@@ -63,17 +63,17 @@ class Calls:
         return len(self.kind)
 
     def take(self, which: Any) -> "Calls":
-        """Return a selection of the calls."""
+        """Return the calls selected by a slice, a mask or indices."""
         return Calls(**{name: column[which] for name, column in vars(self).items()})
 
     def then(self, others: "Calls") -> "Calls":
-        """Return these calls followed by others."""
+        """Return these calls, followed by other calls."""
         pairs = zip(vars(self).items(), vars(others).values(), strict=True)
         return Calls(**{name: np.concatenate((mine, more)) for (name, mine), more in pairs})
 
 
 class Side:
-    """One run of the interpreter.
+    """Calls of one run of the interpreter, prepared for comparison with the other run.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Side:
         return table[kinds]
 
     def name(self, kind: int) -> str:
-        """Return the name of a kind."""
+        """Return the name of a kind of calls."""
         return next(name for name, code in self.run.codes.items() if code == kind)
 
     def _calls(self, block: CallBlock) -> Calls:

@@ -22,11 +22,11 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class RefusedError(Exception):
-    """Refusal of the original program by the interpreter."""
+    """Error if the interpreter refuses the original program."""
 
 
 class Found(NamedTuple):
-    """Results of a comparison."""
+    """Results of the comparison of two programs."""
 
     moves: int
     largest: float  #: largest deviation of a move from the required shift [um]
@@ -125,7 +125,7 @@ class _Joined(NamedTuple):
     pieces: _Pieces | None
 
     def part(self, first: int, last: int) -> "_Joined":
-        """Return a range of the moves."""
+        """Return the calls from `first` up to but excluding `last`, with the pieces of their moves."""
         calls = self.calls.take(slice(first, last))
         if self.pieces is None:
             return _Joined(calls, None)
@@ -134,7 +134,7 @@ class _Joined(NamedTuple):
 
 
 class _Comparison:
-    """Comparison of the calls of two sides."""
+    """Comparison of the calls of the original and of the revised program."""
 
     def __init__(self, first: Side, second: Side, ledger: Ledger) -> None:
         self.sides, self.ledger = (first, second), ledger

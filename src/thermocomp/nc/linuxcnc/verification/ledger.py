@@ -19,7 +19,7 @@ _UNPLACED, _MACHINE = 1.0, 2.0
 
 
 class Shifts(NamedTuple):
-    """Allowed shifts of many lines."""
+    """Required shifts of several lines, and the permitted alternatives."""
 
     before: Floats  #: array of lines x 3
     after: Floats
@@ -31,7 +31,7 @@ class Shifts(NamedTuple):
 
 
 class _Track:
-    """Numbers by line, stored only where they change."""
+    """Vectors of numbers by program line, stored only where they change."""
 
     def __init__(self, width: int) -> None:
         self.lines, self.numbers, self.width = array("i"), array("d"), width
@@ -67,7 +67,7 @@ class Ledger:
         self._last = 0
 
     def take(self, revised: Revised) -> None:
-        """Add a line, in order, including the header."""
+        """Record the shift of the next line; lines are passed in order, including the header."""
         if len(revised.texts) != 1 or not revised.number:
             self._first.append(self._written + 1)
             self._count.append(len(revised.texts))
@@ -113,5 +113,5 @@ class Ledger:
 
     @property
     def lines(self) -> int:
-        """Number of lines processed."""
+        """Number of lines of the original that were recorded."""
         return self._last

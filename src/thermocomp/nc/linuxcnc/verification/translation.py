@@ -57,7 +57,7 @@ class UntranslatableError(InputError):
 
 
 class Translator:
-    """Translator of one program.
+    """Translator of one Fanuc program.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Translator:
         self._length: int | None = None
 
     def translate(self, lines: Iterable[str]) -> Iterator[tuple[str, int]]:
-        """Translate a program."""
+        """Yield the lines of a Fanuc program translated for LinuxCNC."""
         for line in read_lines(lines, "fanuc"):
             block = self._follower.step(line)
             if line.optional and self._setup.skip_optional:
@@ -186,7 +186,7 @@ class Translator:
         return told
 
     def _once(self, block: Block, once: str) -> str:
-        """Return the non-modal code and its words."""
+        """Return the non-modal code of a line with its words, translated."""
         values = block.values
         words = _words(values, _AXES)
         if once == "G10":

@@ -28,7 +28,7 @@ _SPARED = ("rotation", "tool diameters")
 
 
 class Proof(NamedTuple):
-    """Results of the interpreter."""
+    """Results of the verification by the interpreter."""
 
     moves: int  #: number of moves compared in each state
     largest: float  #: largest deviation of a move from the required shift [um]
@@ -139,7 +139,7 @@ def _assumed(setup: Setup, held: Sequence[str]) -> tuple[str, ...]:
 
 
 def foresee_sentence(setup: Setup) -> str:
-    """Return the description of the states for a proof in which the original runs in all of them."""
+    """Return the description of the states, assuming that the original runs in all of them."""
     drawn = setup if setup.controller == "linuxcnc" else Translator(setup).setup()
     return _say_states(states.STATES, _assumed(setup, states.describe_setup(drawn)), states.list_unstated(drawn))
 
@@ -161,7 +161,7 @@ class _Translated(NamedTuple):
 
     @classmethod
     def of(cls, program: Path, path: Path, setup: Setup) -> "_Translated":
-        """Write the translation of a program."""
+        """Write the translation of a Fanuc program to a file."""
         translator, sources = Translator(setup), array("i")
         with (
             program.open(encoding="latin-1", newline="") as texts,
