@@ -1,18 +1,18 @@
 """
-The conventions, drawn
-======================
+Sign conventions in drawings
+============================
 
-Which direction is positive? All figures on this page are drawn from the results of `thermocomp.volumetric`: exact
-transforms with errors enlarged several thousand times to make them visible. The numbers next to them are asserted when
-the page is built. The conventions in words: :doc:`../volumetric`.
+Which direction is positive? All figures on this page are drawn from results of `thermocomp.volumetric`: exact
+transforms with errors enlarged several thousand times to make them visible. The numbers next to them are checked when
+the page is built. :doc:`../volumetric` describes the conventions in words.
 
 In all drawings the **commanded** state is grey and dashed, the **actual** state is black, and the orange arrow is the
 error: actual minus commanded, tool relative to workpiece.
 """
 
 # %%
-# The sections below need a machine of a given structure whose axes were measured at zero, and the error of its tool tip
-# for some components, all others being zero.
+# The sections below need a machine of a given structure whose axes were measured at position zero, and the error of its
+# tool tip if some components are given and all others are zero.
 
 from dataclasses import replace
 
@@ -58,8 +58,8 @@ def moved(of, components, places, at=(0, 0, 0)):
 
 # sphinx_gallery_end_ignore
 # %%
-# Axes and turns
-# --------------
+# Axes and rotations
+# ------------------
 #
 # X, Y and Z are those of ISO 841: Z along the spindle, positive where tool and workpiece move apart. A, B and C are the
 # rotations about X, Y and Z. They are positive by the right-hand rule: thumb along the axis, fingers in the positive
@@ -226,8 +226,8 @@ for ax, (name, across) in zip(axes, (("A0C", "Y"), ("B0C", "X")), strict=True):
 plt.show()
 # sphinx_gallery_end_ignore
 # %%
-# Levers, and who moves
-# ---------------------
+# Levers, and which side moves
+# ----------------------------
 #
 # A component is the motion of the tool side relative to the workpiece side, whichever of them moves. In the upper row
 # the yaw of X is 20 urad. On the left a column carries the tool along X and rotates to the left. On the right a table
@@ -241,8 +241,9 @@ assert error(machine("w X' b Y Z (C1) t"), yaw_x, at=(0, 400, 0)) == [-8, 0, 0]
 
 # %%
 # The lower row shows the yaw of Y, with X 400 mm from the position at which this yaw was measured. On the left the
-# gantry carries X, so X is a lever. On the right the saddle rotates together with the table on it, about the tool; X is
-# on the workpiece side of Y and does not contribute to the lever. This is the only effect of the structure code.
+# gantry carries X, so the position of X is a lever. On the right the saddle rotates together with the table on it,
+# about the tool; X is on the workpiece side of Y and does not contribute to the lever. This is the only effect of the
+# structure code.
 
 assert error(machine("w b Y X Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 8, 0]
 assert error(machine("w X' Y' b Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 0, 0]
@@ -285,7 +286,7 @@ pencil.cross(ax, spot)
 pencil.arrow(ax, (spot[0], 400), (0, 400), pencil.ORANGE, lw=2.6, size=15, z=9)
 pencil.lever(ax, (-75, 0), (-75, 400), "lever\n400 mm", (-85, -60))
 pencil.label(ax, (-185, 475), "d$_X$ = \u22128 um", pencil.ORANGE, size=12)
-pencil.label(ax, (spot[0] + 25, spot[1]), "ought to be\nunder the tool", size=9, ha="left")
+pencil.label(ax, (spot[0] + 25, spot[1]), "should be\nunder the tool", size=9, ha="left")
 
 ax = axes[1, 0]
 pencil.part(ax, pencil.rectangle(-330, 490, 110, 490), z=1)
