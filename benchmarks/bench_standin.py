@@ -86,7 +86,7 @@ def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
 def believed(
     watch: Watch, samples: Samples, failures: Sequence[tuple[int, int, str]], stop: int
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the inputs after the watch, (stop, 1 + n_failures, n_inputs), first without failures; rows of the reports."""
+    """Return the inputs after the watch, (stop, 1 + n_failures, n_inputs), first without failures; report rows."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]
     runs = 1 + len(failures)
     state, report = begin(watch, runs=(runs,)), np.full(runs, stop)

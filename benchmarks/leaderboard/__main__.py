@@ -34,7 +34,9 @@ def main() -> int:
     parser.add_argument(
         "--seconds", type=float, default=40.0, help="limit of the processor time per model and test [s] (default 40)"
     )
-    parser.add_argument("-o", "--output", type=Path, help="folder for board.json and board.md (default: that of this script)")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="folder for board.json and board.md (default: that of this script)"
+    )
     parser.add_argument("--published", metavar="MODEL", help="evaluate MODEL on the published block, append to log")
     args = parser.parse_args()
     if not args.seconds > 0:
