@@ -58,7 +58,7 @@ def numbers(net: Perceptron) -> list[FloatArray]:
 
 
 def seconds(job: Callable[[], object]) -> float:
-    """Return the processor time of `job`: all sides run in one thread, and other programs may run beside them."""
+    """Return the processor time of `job`: everything runs in one thread, while other programs may run."""
     start = time.process_time()
     job()
     return time.process_time() - start

@@ -31,7 +31,7 @@ class Mutant(NamedTuple):
     name: str
     what: str
     file: str  #: of the package
-    old: str  #: stands there once
+    old: str  #: occurs once in the file
     new: str
     tests: list[str]  #: of which one has to fail
     also: Sequence[dict[str, str]] = ()  #: more to replace at once: file, old, new

@@ -1,4 +1,4 @@
-"""Leaderboard: every model on every test, as one table. See README.md beside this file."""
+"""Leaderboard: every model on every test, as one table. See README.md in this folder."""
 
 import os
 

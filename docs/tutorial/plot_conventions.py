@@ -50,7 +50,7 @@ def error(of, components, at=(0, 0, 0), tool=(0, 0, 0)):
 
 # sphinx_gallery_start_ignore
 def moved(of, components, places, at=(0, 0, 0)):
-    """Return where places of the last body really are [mm], (n, 3), for components as large as one likes."""
+    """Return the actual positions of points of the last body [mm], (n, 3), for components of any size."""
     places = np.asarray(places, float)
     off = [exact.error(of, values(components), np.asarray(at, float), p) for p in places]
     return np.asarray(at, float) + places + 1e-3 * np.array(off)
@@ -145,7 +145,7 @@ for ax, (name, across, along) in zip(axes, (("C0Y", "X", "Y"), ("B0Z", "X", "Z")
     i, j = "XYZ".index(across), "XYZ".index(along)
 
     def shown(way, i=i, j=j, name=name):
-        """Return where the axis is when told to go to `way`, in the drawing's plane, 25,000 times too large."""
+        """Return the actual position for a commanded `way`, in the drawing's plane, with errors enlarged."""
         at = np.eye(3)[j] * way
         return (at + 25.0 * np.array(error(three, {name: 12}, at=at)))[[i, j]]
 
@@ -195,7 +195,7 @@ for ax, (name, across) in zip(axes, (("A0C", "Y"), ("B0C", "X")), strict=True):
     k = "XYZ".index(across)
 
     def shown(shape, k=k, name=name):
-        """Return where places of the spindle are, tilted 8,000 times too much."""
+        """Return the actual positions of points of the spindle, with the tilt enlarged 8,000 times."""
         places = np.zeros((len(shape), 3))
         places[:, k], places[:, 2] = np.asarray(shape, float).T
         return moved(mill, {name: 30 * 8000}, places)[:, [k, 2]]
