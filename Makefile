@@ -1,23 +1,23 @@
-# Everything a stranger needs, on a bare Debian with Python >= 3.11: `make demo` and `make test`.
+# All that is needed on a bare Debian with Python >= 3.11: `make demo` and `make test`.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 BENCH ?= .venv-bench
 PYTEST ?=
-# a worker of the tests has a core of its own: threads of linear algebra take turns with the other worker's, and spin
+# each test worker uses one core: more threads of linear algebra would compete with the other worker
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-long check bench docs count clean
 
 help:
-	@echo "make demo    the main job on the virtual machine: record, fit, judge on unseen cycles, report"
+	@echo "make demo    the main workflow on the virtual machine: record, fit, evaluate on unseen cycles, report"
 	@echo "make test    the tests (installs what they need)"
-	@echo "make test-long   the tests that take long, and 2,000 random NC programs"
+	@echo "make test-long   the long-running tests, and 2,000 random NC programs"
 	@echo "make check   format, lint, types, architecture"
-	@echo "make bench   speed and accuracy beside the peers"
+	@echo "make bench   speed and accuracy compared with other packages"
 	@echo "make docs    the documentation, into docs/_build/html"
-	@echo "make count   lines of code by room"
-	@echo "make clean   take away what the other targets made"
+	@echo "make count   lines of code by package"
+	@echo "make clean   remove everything that the other targets created"
 
 demo: $(VENV)/.study
 	$(BIN)/thermocomp demo --output demo --overwrite
@@ -38,7 +38,7 @@ check: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# in an environment of its own: the peers want older libraries. Without R its peers are left out.
+# in a separate environment: the other packages require older libraries. Without R its packages are omitted.
 bench: $(BENCH)/.bench
 	-scripts/system_packages.sh r-base-core r-cran-acepack r-cran-leaps
 	$(BENCH)/bin/python benchmarks/run.py

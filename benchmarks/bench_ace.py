@@ -1,11 +1,12 @@
-"""ACE against R's acepack and the Python package ace: single fits, and Wessel's 35,259 models.
+"""ACE compared with R's acepack and the Python package ace: single fits, and Wessel's 35,259 models.
 
-Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_ace.py [--quick]``; ``--quick`` leaves the slow sides out: the
-package ace beyond the smallest size, and acepack converged. R is timed inside R. A side not installed is left out.
+Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_ace.py [--quick]``; ``--quick`` omits the slow peers: the package
+ace beyond the smallest size, and acepack converged. R is timed inside R. A peer that is not installed is omitted.
 
-The sides do not smooth alike (boxcar on ranks here, super smoother there), so they must agree on the squared maximal
-correlation to 0.05 only. acepack, and here ``solve``, stop when it (or the error) changes by less than 0.01, after 20
-sweeps at the latest. Of the 35,259 models acepack gets a random sample in the same run, and its time is extrapolated.
+The implementations smooth differently (boxcar on ranks here, super smoother in the peers), so their squared maximal
+correlations must agree to 0.05 only. acepack, and here ``solve``, stop when it (or the error) changes by less than
+0.01, after 20 sweeps at the latest. acepack fits a random sample of the 35,259 models in the same run; its time is
+extrapolated.
 """
 
 import contextlib
@@ -111,7 +112,7 @@ def seconds(job: Callable[[], object], turns: int, calls: int = 1) -> float:
 
 
 def single(n: int, p: int, goal: float, with_ace: bool) -> bool:
-    """Compare one fit, whole: sorting and sweeps."""
+    """Compare one whole fit: sorting and sweeps."""
     T, S = test_run(n, p, 1, seed=n)
     y = S[:, 0]
 

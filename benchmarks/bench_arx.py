@@ -1,8 +1,8 @@
-"""ARX against statsmodels (fit) and SysIdentPy (free run): orders 5, four inputs with five lags each, 10,000 rows.
+"""ARX compared with statsmodels (fit) and SysIdentPy (free run): order 5, four inputs with five lags each, 10,000 rows.
 
-Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_arx.py``. Three jobs, both sides in turn, medians: the coefficients
-from one-step least squares (statsmodels gets the lag matrix ready made, ours starts from the recording), the free run
-of the same coefficients, and the orders by FPE (statsmodels refits for each). Agreement is checked in the same run.
+Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_arx.py``. Three tasks, timed alternately, medians: the coefficients
+by one-step least squares (statsmodels gets the prepared lag matrix, ours starts from the recording), the free run
+with the same coefficients, and the orders by FPE (statsmodels refits for each). Agreement is checked in the same run.
 """
 
 import sys
@@ -48,7 +48,7 @@ def lag_matrix(inputs: FloatArray, z: FloatArray, k: int, lags: int) -> FloatArr
 def medians(
     ours: Callable[[], FloatArray], theirs: Callable[[], FloatArray], turns: int, per_turn: int
 ) -> tuple[float, float, float]:
-    """Return both medians [s] and the greatest relative disagreement."""
+    """Return both medians [s] and the largest relative difference."""
     ours()  # warm
     theirs()
     us, them, apart = [], [], 0.0
@@ -116,7 +116,7 @@ def main() -> int:
 
     report("fit (5, 4 x 5), statsmodels OLS", medians(fit, lambda: sm.OLS(y, X).fit().params, 9, 5), 5, 1e-8)
 
-    # the free run from rest: no input in the first rows, so both sides start from the same nothing
+    # the free run from rest: no input in the first rows, so both start from zero
     quiet = inputs.copy()
     quiet[:K] = 0.0
     theirs = free_run_of_sysidentpy(quiet, z, model)

@@ -1,9 +1,9 @@
-"""Bands of `averaged`: what share of unseen cycles they hold, and how wide they are.
+"""Uncertainty bands of `averaged`: the share of unseen rows inside them (coverage), and their width.
 
-Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2] [--physics nonlinear]`` (200 take an hour of
-two free cores). On a virtual machine: protocols drawn at random (speeds, feeds, lengths of run and stop, weather by
-seed), of which the first 3, 5 or 10 cycles are learned from and three more are judged, by the replay of the frozen
-model. Then, where the measured data are there, fl_thermal: rows 0-6668, each cycle left out.
+Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2] [--physics nonlinear]`` (200 take an hour on
+two free cores). On a virtual machine, with protocols drawn at random (speeds, feeds, durations of run and standstill,
+weather by seed), the first 3, 5 or 10 cycles are used for training and three more for validation, by a replay of the
+frozen model. Then, if the measured data are available, fl_thermal: rows 0-6668, each cycle left out in turn.
 """
 
 import argparse
@@ -28,14 +28,14 @@ from thermocomp.virtual.protocol import Physics
 
 TARGETS = ("x1_um", "y1_um", "z_um")
 LEARNED, JUDGED = (3, 5, 10), 3
-#: least and most mean coverage, least of the recording that nine in ten are better than, most half-width over RMS error
+#: lower and upper bound of the mean coverage, lower bound of its 10 % quantile, upper bound of half-width / RMS error
 COVERAGE, WORST, WIDTH = (0.85, 0.95), 0.7, 2.5
 #: rows of fl_thermal before its published test block, which is not looked at here
 BEFORE = 6669
 
 
 class Held(NamedTuple):
-    """How the band of one channel did on cycles that it had not seen."""
+    """Coverage and width of the band of one channel on unseen cycles."""
 
     coverage: float
     half_width: float  #: mean [um]
@@ -44,7 +44,7 @@ class Held(NamedTuple):
 
 
 def protocol(rng: np.random.Generator, cycles: int) -> str:
-    """Return a protocol of so many cycles: speeds, feeds, lengths of run and stop at random."""
+    """Return a protocol of this number of cycles, with random speeds, feeds and durations of run and standstill."""
     lines = ['description = "drawn at random"', 'sampling = "1 min"', "[[segments]]", 'duration = "15 min"']
     for _ in range(cycles):
         feed = int(rng.integers(0, 3)) * 500
@@ -60,7 +60,7 @@ def protocol(rng: np.random.Generator, cycles: int) -> str:
 
 
 def hold(samples: Samples, target: int, learn: NDArray[np.bool_]) -> Held:
-    """Train on some rows and judge the band on the others of those with a cycle."""
+    """Train on some rows and evaluate the band on the other rows that belong to a cycle."""
     model = train("averaged", samples, target, learn, joint=False).model
     judged = ~learn & np.isfinite(samples.deviations[:, target])
     found = replay_compensated(model, samples, judged)
@@ -74,7 +74,7 @@ def hold(samples: Samples, target: int, learn: NDArray[np.bool_]) -> Held:
 
 
 def drawn(cycles: int, physics: Physics, seed: int) -> list[Held]:
-    """Return how the bands of the channels of one recording did."""
+    """Return coverage and width of the bands of the channels of one recording."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "drawn.toml"
         path.write_text(protocol(np.random.default_rng([seed, cycles]), cycles + JUDGED), encoding="utf-8")
@@ -85,7 +85,7 @@ def drawn(cycles: int, physics: Physics, seed: int) -> list[Held]:
 
 
 def show(title: str, held: list[list[Held]]) -> bool:
-    """Print what came of recordings, a list of channels each; return whether the goals are reached."""
+    """Print the results of recordings, a list of channels each; return whether the goals are reached."""
     own = np.array([np.mean([h.coverage for h in one]) for one in held])
     every = [h for one in held for h in one]
     ratio = float(np.mean([h.half_width for h in every]) / np.sqrt(np.mean([h.rms**2 for h in every])))
@@ -103,11 +103,11 @@ def show(title: str, held: list[list[Held]]) -> bool:
 
 
 def measured(jobs: int) -> None:
-    """Print how the bands do on fl_thermal, each cycle of the rows before the published block left out."""
+    """Print the results on fl_thermal, with each cycle of the rows before the published block left out."""
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
     if not path.is_file():
-        print(f"skipped: {path} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
         return
     targets = [f"ch{k}_um" for k in range(1, 6)]
     whole = stack([recordings.read(path)], targets)

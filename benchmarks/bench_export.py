@@ -1,8 +1,8 @@
-"""One call of a compensator's C code, beside the compensator: five channels of the demo, 16 temperatures, watched.
+"""One call of a compensator's C code compared with the compensator: five targets of the demo, 16 temperatures, watch.
 
-Run with ``python benchmarks/bench_export.py``; it wants gcc. Both get the same readings, one a second, in turn; every
-decision must be the same and corrections agree to 1e-12. Goal: the median call of the C code takes at most 1 us. In
-every tenth the watch looks at the sensors: that is the slowest tenth.
+Run with ``python benchmarks/bench_export.py``; it requires gcc. Both process the same readings, one a second; every
+decision must be the same and corrections agree to 1e-12. Goal: the median call of the C code takes at most 1 us. The
+watch evaluates the sensors in every tenth call, which is therefore slower.
 """
 
 import ctypes

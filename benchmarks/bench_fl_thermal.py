@@ -1,11 +1,11 @@
 """fl_thermal, measured on a real machine: the published test block, and whole cycles left out.
 
-Run with ``python benchmarks/bench_fl_thermal.py``. Rows 0-6668 are learned from, rows 6669-8891 are the published test
-block. Published figures: FL_THERMAL (GitHub CAIVIAC/FL_THERMAL). Skipped where the measured data are absent.
+Run with ``python benchmarks/bench_fl_thermal.py``. Rows 0-6668 are the training data, rows 6669-8891 the published test
+block. Published results: FL_THERMAL (GitHub CAIVIAC/FL_THERMAL). Skipped if the measured data are missing.
 
-How often ``averaged`` was judged on that block stands in `LOG`; it is not judged on it here: a block that is looked at
-whenever something changes is learned from. It is judged on whole cycles: inside rows 0-6668, its six sensors chosen
-without the judged cycle, and over the file.
+`LOG` contains the evaluations of ``averaged`` on that block; it is not evaluated on it here, because a block that is
+used after every change is no longer unseen. It is evaluated on whole cycles: within rows 0-6668, with its six sensors
+selected without the left-out cycle, and over the whole file.
 """
 
 import os
@@ -37,11 +37,11 @@ PUBLISHED = {
 BEST = PUBLISHED["GRU with attention (published best)"]
 GOAL_MEAN = 1.9
 
-#: each judgement of a method on the published block
+#: every evaluation of a method on the published block
 LOG = Path(__file__).resolve().parent / "leaderboard" / "published_block.md"
-#: of `averaged`: mean and worst channel on the block with six sensors, mean with all; mean of cycles left out, nested
+#: of `averaged`: mean and worst channel on the block with six sensors, mean with all; mean over left-out cycles, nested
 GOAL_SIX, GOAL_WORST, GOAL_ALL, GOAL_NESTED = 1.4, 1.8, 1.3, 1.5
-#: what `dynamic` left of each channel, cycles of the whole file left out, before there was `averaged` [um]
+#: error of `dynamic` per channel, with cycles of the whole file left out, before `averaged` was introduced [um]
 DYNAMIC = (1.44, 1.37, 4.81, 4.59, 3.51)
 LEARNED = 6669
 
@@ -50,7 +50,7 @@ def main() -> int:
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
     if not path.is_file():
-        print(f"skipped: {path} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
         return 0
     begin = time.perf_counter()
     targets = [f"ch{k}_um" for k in range(1, 6)]
@@ -73,7 +73,7 @@ def main() -> int:
     dynamic, (_, _, six), (_, _, every) = errors["dynamic"], *judged[-2:]
     whole = stack([recordings.read(path)], targets)
     nested, chosen = leave_out(whole.take(np.arange(len(whole)) < LEARNED), most=6)
-    print(f"whole cycles left out, rows 0-{LEARNED - 1}, six sensors chosen without the judged cycle:")
+    print(f"whole cycles left out, rows 0-{LEARNED - 1}, six sensors selected without the left-out cycle:")
     print(f"{'averaged':<48}" + "".join(f"{v:>8.2f}" for v in (*nested, nested.mean())))
     for names in chosen:
         print(f"    {' '.join(names)}")
@@ -111,7 +111,7 @@ def leave_out(samples: Samples, most: int | None = None) -> tuple[FloatArray, li
 
 
 def _unseen(samples: Samples, target: int, learn: NDArray[np.bool_]) -> FloatArray:
-    """Return the error of the frozen model, its inputs clipped to what it has seen, in the rows not learned from."""
+    """Return the error of the frozen model, with inputs clipped to its trained range, in the validation rows."""
     model = train("averaged", samples, target, learn).model
     deviation, _ = replay(model, samples, ~learn)
     return np.asarray(deviation - samples.deviations[~learn, target])

@@ -1,6 +1,6 @@
-"""A tick of 10,000 machines with 24 temperatures each, beside the same machines one by one.
+"""One step of 10,000 machines with 24 temperatures each, compared with the same machines one by one.
 
-Run with ``python benchmarks/bench_fleet.py``. Both are timed in turn in one run. Goal: at most 1 ms in ``float32``.
+Run with ``python benchmarks/bench_fleet.py``. Both are timed alternately in one run. Goal: at most 1 ms in ``float32``.
 """
 
 import sys
@@ -20,7 +20,7 @@ MACHINES, CHANNELS, GOAL_MS = 10_000, 24, 1.0
 
 
 def model() -> LinearDynamic:
-    """Return a model with a lag behind each temperature."""
+    """Return a model with a lag of each temperature."""
     rng = np.random.default_rng(0)
     return LinearDynamic(
         target="z_um",
@@ -47,7 +47,7 @@ def main() -> int:
     state, _ = machine.step(machine.start(), Reading(0.0, _table(own, zeros[0])), 0.0)
     fleets = {kind: Fleet(own, zeros, Limits(), kind) for kind in ("float32", "float64")}
     times: dict[str, list[float]] = {}
-    for stretch in range(20):  # in turn, but no tick with caches that another has filled
+    for stretch in range(20):  # alternately, but no step with caches that another one has filled
         for kind, fleet in fleets.items():
             for name, given in ((kind, readings), (f"{kind}, 1 % of the readings refused", missing)):
                 for k in range(20):

@@ -1,10 +1,10 @@
-"""The watch over machines on which nothing fails: what it accuses all the same.
+"""False alarms of the watch on machines whose sensors are all intact.
 
-Run with ``python benchmarks/bench_healthy.py [tests]`` (9 tests of 12 h of the virtual machine with each physics). The
-watch is fitted to the demo; the tests have other speeds, drawn every 45 min, and other weathers (18 to 26 degC, no
-rougher than the demo's), with the axes still as in the demo. And where the measured data are there, recordings of
-printers without a spindle: a watch learned from the first half of 2021-06-13, which goes through the whole of it, and
-through 06-12, of another printer, whose chamber sensor is absent and reads -180 degC.
+Run with ``python benchmarks/bench_healthy.py [tests]`` (9 tests of 12 h on the linear and on the nonlinear virtual
+machine). The watch is fitted to the demo; the tests have other speeds, drawn every 45 min, and other weather (18 to 26
+degC, no more variable than in the demo), with the axes stopped as in the demo. If the measured data are available, also
+recordings of printers without a spindle: a watch fitted to the first half of 2021-06-13 is run over the whole of it,
+and over 06-12 of another printer, whose chamber sensor is absent and reads -180 degC.
 """
 
 import os
@@ -27,7 +27,7 @@ TESTS = 9
 HERE = Path(__file__).resolve().parents[1]
 FEW = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")
 PROTOCOL = """
-description = "speeds drawn by lot, axes still"
+description = "speeds drawn at random, axes stopped"
 sampling = "1 min"
 places = "usual"
 climate = {{ mean = {mean}, daily = {daily}, wander = {wander} }}
@@ -51,7 +51,7 @@ place = "chamber"
 
 
 def accused(watch: Watch, samples: Samples) -> dict[str, str]:
-    """Return what each sensor of a test is first found to be."""
+    """Return the first status other than good that the watch gives to each sensor of a test."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]
     state, found = begin(watch), dict[str, str]()
     for k, time in enumerate(samples.time.tolist()):
@@ -90,7 +90,7 @@ def virtual(count: int) -> bool:
 def printers() -> bool:
     folder = Path(os.environ.get("THERMOCOMP_DATA", HERE.parent / "shared" / "data")) / "voron_frame"
     if not folder.is_dir():
-        print(f"skipped: {folder} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        print(f"skipped: {folder} is missing; set THERMOCOMP_DATA to the folder of the measured data")
         return True
     with tempfile.TemporaryDirectory() as place:
         own = Path(place) / "voron.toml"
@@ -102,7 +102,7 @@ def printers() -> bool:
         print("voron: nothing to watch")
         return True
     said = accused(watch, second)
-    print(f"voron 06-13, learned from its first half: false alarms {said or 'none'}")
+    print(f"voron 06-13, fitted to its first half: false alarms {said or 'none'}")
     other = accused(watch, first)
     print(f"voron 06-12, another printer whose chamber sensor is absent, by that watch: {other or 'nothing'}")
     return not said and other.get("chamber_t") == "missing"

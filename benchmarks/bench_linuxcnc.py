@@ -1,8 +1,8 @@
-"""A correction on its way into a real LinuxCNC: from `apply` until HAL has it; and a trace of what becomes of it.
+"""Delay of a correction to a real LinuxCNC, from `apply` to HAL, and a trace of its effect at the drive.
 
-Run with ``PYTHONPATH=tests/helpers python benchmarks/bench_linuxcnc.py [--figure trace.png]``, where LinuxCNC is. The
-answer of the component comes after it has set the pins, so the time until the answer is an upper bound; the servo
-thread reads them within its next period. Goal: 99 % within 20 ms at 100 corrections a second.
+Run with ``PYTHONPATH=tests/helpers python benchmarks/bench_linuxcnc.py [--figure trace.png]``; requires LinuxCNC. The
+component answers after it has set the pins, so the time until the answer is an upper bound; the servo
+thread reads the pins within its next period. Goal: 99 % within 20 ms at 100 corrections a second.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ PROGRAM = "G21 G90 G64\n" + "G1 X60 Z-40 F3600\nG1 X-60 Z40\n" * 100 + "M2\n"
 
 
 async def correct(machine: Live) -> NDArray[np.float64]:
-    """Correct a machine that moves, and return how long each correction took [ms]."""
+    """Correct a moving machine, and return the delay of each correction [ms]."""
     sink = LinuxCncSink(path=machine.socket, axes={"z_um": "Z"})
     await sink.connect(5.0)
     machine.do("trace", "trace")
@@ -42,7 +42,7 @@ async def correct(machine: Live) -> NDArray[np.float64]:
 
 
 def draw(trace: Trace, path: Path) -> None:
-    """Draw what was demanded, what the drive was told, and the difference."""
+    """Plot the demanded correction, the correction sent to the drive, and their difference."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
@@ -52,7 +52,7 @@ def draw(trace: Trace, path: Path) -> None:
     axes[0].plot(t, trace.commanded["Z"], color="0.4", linewidth=1.0)
     axes[0].set_ylabel("Z [mm]")
     axes[1].plot(t, demanded, color="tab:orange", linewidth=3.0, label="demanded: offset + slope x position")
-    axes[1].plot(t, added, color="tab:blue", linewidth=1.0, label="in force: what the drive is told more")
+    axes[1].plot(t, added, color="tab:blue", linewidth=1.0, label="in force: correction sent to the drive")
     axes[1].set_ylabel("correction [um]")
     axes[1].legend(loc="upper right")
     axes[2].plot(t, added - demanded, color="tab:blue", linewidth=0.8)
@@ -75,7 +75,7 @@ def main() -> int:
     print(
         f"{len(took)} corrections: p50 {p50:.2f} ms, p99 {p99:.2f} ms, longest {took.max():.1f} ms (goal {GOAL_MS} ms)"
     )
-    print(f"{len(aside)} periods: what the drive is told is within {aside.max():.3f} um of what is demanded")
+    print(f"{len(aside)} periods: the correction at the drive is within {aside.max():.3f} um of the demanded one")
     if "--figure" in sys.argv:
         draw(trace, Path(sys.argv[sys.argv.index("--figure") + 1]))
     return int(p99 > GOAL_MS)

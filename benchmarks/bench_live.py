@@ -1,8 +1,8 @@
-"""The service between a real broker and a real LinuxCNC: from message to HAL pin, and how much one process takes.
+"""The service between a real MQTT broker and a real LinuxCNC: delay from message to HAL pin, and processor load.
 
-Run with ``PYTHONPATH=tests/helpers python benchmarks/bench_live.py``, where mosquitto and LinuxCNC are. Messages hold
-24 temperatures; a page is open and a journal is written all the time. Goals: 99 % of 100 messages a second are in HAL
-within 20 ms; 5,000 values a second through one process.
+Run with ``PYTHONPATH=tests/helpers python benchmarks/bench_live.py``; requires mosquitto and LinuxCNC. Messages contain
+24 temperatures; a page is open and a journal is written all the time. Goals: 99 % of 100 messages a second arrive in
+HAL within 20 ms; one process handles 5,000 values a second.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ STEP = 2.0  # um between two levels
 
 
 class Pins(threading.Thread):
-    """What HAL was told last, looked at all the time."""
+    """The last value in HAL, polled continuously."""
 
     def __init__(self, machine: Live) -> None:
         super().__init__(daemon=True)
@@ -41,7 +41,7 @@ class Pins(threading.Thread):
         self.seen: list[tuple[float, float]] = []
 
     def run(self) -> None:
-        """Look until it is told to end."""
+        """Poll until stopped."""
         while not self.ended.is_set():
             value = 1e3 * self.machine.get("tc.z.from0.in1")
             if not self.seen or abs(value - self.seen[-1][1]) > 0.1:
@@ -77,7 +77,7 @@ def used(pid: int) -> tuple[float, float]:
 
 
 async def measure(machine: Live, port: int, pid: int, url: str) -> np.ndarray:
-    """Return how long each message took to the pin [ms], and print what a full stream of values takes."""
+    """Return the delay of each message to the pin [ms], and print the load of a full stream of values."""
     page = asyncio.create_task(watch_page(url))
     await publish(port, 20.0, 3.0)
     pins = Pins(machine)
@@ -105,7 +105,7 @@ async def measure(machine: Live, port: int, pid: int, url: str) -> np.ndarray:
 
 
 def main() -> int:
-    """Print the figures; 1 if a goal is missed."""
+    """Print the results; return 1 if a goal is missed."""
     own = model()
     still = replace(own, direct=(STEP, *[0.1] * 23), lagged=(0.0,) * 24, honest_error=ACCEPTED)
     with tempfile.TemporaryDirectory() as name, live(HalSettings(axes=AXES, rate=1e4)) as machine:

@@ -1,14 +1,14 @@
 """NC programs: lines per second of the tokenizer, and microseconds and memory of ``thermocomp revise``.
 
-Run with ``python benchmarks/bench_nc.py [PROGRAM]``. Without a program: LinuxCNC's 3D_Chips.ngc where it is installed,
-and programs like those of CAM systems, made here; these are also revised, by the command itself, each in a process of
-its own: program, differences, table and next state are written, no picture is drawn, nothing is proved. Where LinuxCNC
-is installed one of 500,000 lines is proved by its interpreter as well. Goals: the tokenizer reads at least 100,000
-lines per second; a program of 1,000,000 lines takes at most 1.2 times the memory of one of 100,000; with proof 150 s
-of processor time and 300 MB.
+Run with ``python benchmarks/bench_nc.py [PROGRAM]``. Without a program: LinuxCNC's 3D_Chips.ngc if it is installed, and
+generated programs like those of CAM systems. The latter are also revised by the command, each in a separate process:
+program, differences, table and thermal state are written, without a figure and without verification. If LinuxCNC is
+installed, a program of 500,000 lines is also verified by its interpreter. Goals: the tokenizer reads at least 100,000
+lines per second; a program of 1,000,000 lines takes at most 1.2 times the memory of one of 100,000; with verification
+150 s of processor time and 300 MB.
 """
 
-# The parent imports nothing big: on Linux a child's ru_maxrss starts at the size of the process that forked it.
+# The parent imports no large package: on Linux a child's ru_maxrss starts at the size of the process that forked it.
 import itertools
 import json
 import math
@@ -34,7 +34,7 @@ PROVED, GOAL_SECONDS, GOAL_MEGABYTES = 500_000, 150.0, 300.0
 
 
 def made(count: int = 20_000) -> list[str]:
-    """Return lines of a finishing program, now and then with a comment, an arc, or an expression."""
+    """Return lines of a finishing program, some with a comment, an arc or an expression."""
     draw = random.Random(1)
     lines = ["%\n", "O1000 (made)\n", "G21 G17 G90 G40 G49 G80\n", "T1 M6\n", "S8000 M3\n", "G0 X0 Y0 Z5.\n"]
     for k in range(count):
@@ -52,7 +52,7 @@ def made(count: int = 20_000) -> list[str]:
 
 
 def rate(lines: list[str]) -> float:
-    """Return lines per second of processor time, of the best round: the others were disturbed."""
+    """Return lines per second of processor time in the best round, which was disturbed least by other programs."""
     best = float("inf")
     for _ in range(ROUNDS):
         begin = time.process_time()
@@ -63,7 +63,7 @@ def rate(lines: list[str]) -> float:
 
 
 def cam(count: int) -> Iterator[str]:
-    """Yield so many lines of a program: rows over a wavy face in short cuts, retracts, arcs, two tools in turn."""
+    """Yield this number of lines of a program: rows of short cuts over a wavy face, retracts, arcs, two tools."""
     head = ["%\n", "(made)\n", "G21 G17 G90 G94 G40 G49 G80 G54\n", "G64 P0.01\n", "S8000 M3\n", "G0 Z50.\n"]
     tail = ["G0 Z50.\n", "M5\n", "M30\n", "%\n"]
     yield from head
@@ -94,7 +94,7 @@ def operations() -> Iterator[str]:
 
 
 def revise(program: Path, proof: str) -> dict[str, float]:
-    """Revise a program by the command; us per line, of the processor for it and its children, memory in MB."""
+    """Revise a program by the command; return times in us per line, also of its children, and memory in MB."""
     sys.modules["matplotlib"] = None  # type: ignore[assignment]
     from thermocomp.cli.app import run
     from thermocomp.core.inputs import Input

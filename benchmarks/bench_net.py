@@ -1,8 +1,8 @@
-"""Chen's 9-20-3 net, 810 patterns, 5,000 epochs with an update after every pattern, against two ways to do the same.
+"""Chen's 9-20-3 network, 810 patterns, 5,000 epochs with an update after every pattern, compared with two peers.
 
 Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_net.py``. Peers are scikit-learn's ``MLPRegressor`` with
 ``solver="sgd", batch_size=1`` (its output is linear, so it can be compared in speed only) and the same algorithm in
-plain numpy, with which all weights must agree. Both would take minutes, so a few epochs are timed and multiplied.
+plain numpy, whose weights must be the same. Both would take minutes, so a few epochs are timed and extrapolated.
 """
 
 import sys
@@ -26,7 +26,7 @@ TURNS, FEW = 5, 4
 
 
 def patterns() -> tuple[FloatArray, FloatArray]:
-    """Return nine scaled temperatures and three scaled drifts, which are bent functions of them."""
+    """Return nine scaled temperatures and three scaled drifts, which are nonlinear functions of them."""
     rng = np.random.default_rng(0)
     hours = np.linspace(0, 80, N_ROWS)[:, None]
     rises = 10 * rng.uniform(0.3, 1, 9) * (1 - np.cos(2 * np.pi * (hours / 16 - rng.uniform(0, 0.2, 9))))
@@ -37,7 +37,7 @@ def patterns() -> tuple[FloatArray, FloatArray]:
 
 
 def plain(net: Perceptron, x: FloatArray, t: FloatArray, rates: FloatArray) -> list[FloatArray]:
-    """Train a copy of `net` as one writes it with numpy; return its weights and thresholds."""
+    """Train a copy of `net` with plain numpy; return its weights and thresholds."""
     W, a = np.array(net.hidden_weights), np.array(net.hidden_thresholds)
     V, b = np.array(net.output_weights), np.array(net.output_thresholds)
     for rate in rates:
@@ -58,7 +58,7 @@ def numbers(net: Perceptron) -> list[FloatArray]:
 
 
 def seconds(job: Callable[[], object]) -> float:
-    """Return the processor time of `job`: all sides run in one thread, and other programs may run beside them."""
+    """Return the processor time of `job`: everything runs in one thread, while other programs may run."""
     start = time.process_time()
     job()
     return time.process_time() - start
@@ -98,7 +98,7 @@ def main() -> int:
     times: dict[str, list[float]] = {"ours": [], "scikit-learn": [], "numpy": []}
     for _ in range(TURNS):
         times["ours"].append(seconds(ours))
-        # the difference leaves out what is done once
+        # the difference excludes what is done only once
         per_epoch = (seconds(lambda: theirs(1 + FEW)) - seconds(lambda: theirs(1))) / FEW
         times["scikit-learn"].append(per_epoch * N_EPOCHS)
         times["numpy"].append(seconds(lambda: plain(start, x, t, rates[:1])) * N_EPOCHS)

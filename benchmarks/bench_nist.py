@@ -1,4 +1,4 @@
-"""Correct digits on NIST's reference problems for linear regression (StRD), ours beside others'.
+"""Correct digits on NIST's reference problems for linear regression (StRD), compared with other packages.
 
 Run with ``python benchmarks/bench_nist.py [FOLDER]``; FOLDER holds Longley.dat and the other ten. Digits are the
 smallest -log10 of the relative error over all parameters, at most 15. All sides get the same float64 columns.

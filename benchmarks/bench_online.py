@@ -1,10 +1,10 @@
-"""One live sample: the compensator and the frozen model beside their estimator and a scikit-learn pipeline.
+"""One reading: the compensator and the frozen model compared with their estimator and a scikit-learn pipeline.
 
-Run with ``python benchmarks/bench_online.py``. All sides are timed in turn in one run, on the same readings; frozen
-model and estimator must say the same to 1e-12 relative. Goals: the median step of the compensator with one model, and
-that of `averaged` for the five channels of the virtual machine's demo with their bands and the watch over its 16
-temperatures, take at most 50 us; the whole step of the compensator with all of that, from reading to corrections,
-100 us. A reading comes every second; in every tenth the watch looks at the differences.
+Run with ``python benchmarks/bench_online.py``. All are timed alternately in one run, on the same readings; the
+predictions of frozen model and estimator must agree to 1e-12 relative. Goals: the median step of the compensator with
+one model, and that of `averaged` for the five targets of the virtual machine's demo with their bands and the watch over
+its 16 temperatures, take at most 50 us; the whole step of the compensator with these, from reading to corrections, 100
+us. There is a reading every second; the watch evaluates the differences in every tenth.
 """
 
 import sys
@@ -42,7 +42,7 @@ HONEST = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so tha
 
 
 def recording(seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
-    """Return inputs (temperatures, then the speed), drift, time steps and cycles of four runs and stops."""
+    """Return inputs (temperatures, then the speed), drift, time steps and cycles of four runs and standstills."""
     rng = np.random.default_rng(seed)
     speed = np.repeat([0, 1500, 0, 4000, 0, 2500, 0, 3500], N_ROWS // 8).astype(float)
     steps = np.full(N_ROWS, 30.0)
@@ -72,9 +72,9 @@ def percentiles(job: Callable[[int], object], count: int) -> tuple[float, float]
 
 
 def steps_of_five() -> tuple[Callable[[int], object], Callable[[int], object]]:
-    """Return two steps of five channels.
+    """Return two functions that make a step of five targets.
 
-    Which temperatures are believed, what the models say, and their bands; and a whole one of the compensator.
+    The first evaluates watch, models and bands; the second is a whole step of the compensator.
     """
     (found,) = record("demo")
     samples = stack([found], [c.name for c in found.displacements])

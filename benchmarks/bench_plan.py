@@ -1,16 +1,16 @@
-"""The planner: does it find what is missing, does its test help more than another, what does stopping early cost.
+"""The planner: detection of gaps, benefit of its test compared with another one, and cost of stopping early.
 
 Run with ``python benchmarks/bench_plan.py [--seeds 30 40] [--chen 21 22 23] [--jobs 2] [--figure PATH]``
-(five minutes of two free cores).
+(five minutes on two free cores).
 
-First, recordings of the virtual machine with one gap each: no run above half of the top speed, no stop after a fast
-run, a room that never changes, no run or stop longer than 30 min. The planner's first test has to be one that fills the
-gap, and learned with it, the frozen model has to err less on a varied recording (all speeds, stops and rooms) than with
-a test of equal length drawn from the rest of the grid.
+First, recordings of the virtual machine with one gap each: no run above half of the top speed, no standstill after a
+fast run, a constant room temperature, or no run or standstill longer than 30 min. The planner's first test must fill
+the gap. With this test in the training data, the error of the frozen model on a varied recording (all speeds,
+standstills and room temperatures) must be smaller than with a test of equal length drawn from the rest of the grid.
 
-Then the stopping rule: in each test of `chen1996` the spindle is stopped as soon as the rule says so, and the test
-ended as soon as it says so again. Models learned from these tests are judged on the full ones, each file left out,
-beside models learned from the full tests, and from tests cut at fixed times.
+Then the stopping rule: in each test of `chen1996` the spindle is stopped as soon as the rule permits it, and the test
+ended as soon as it permits it again. Models fitted to these tests are evaluated on the full tests, with each file left
+out, and compared with models fitted to the full tests and to tests cut at fixed times.
 """
 
 import argparse
@@ -41,11 +41,11 @@ Gap = Literal["speed", "stop", "room", "duration"]
 GAPS: tuple[Gap, ...] = get_args(Gap)
 TARGETS = ("x1_um", "y1_um", "z_um")
 TOP = 3000.0
-#: shares of the ten that have to be right; share of a test's time, and ratio of the error, of the stopping rule
+#: required number of correct results of ten; limits of relative duration and error ratio of the stopping rule
 RIGHT, SHARE, RATIO = 0.8, 1 / 3, 1.2
-#: of chen1996: speeds [1/min], run and stop [min], time between two rows [min]
+#: of chen1996: speeds [1/min], run and standstill [min], time between two rows [min]
 SPEEDS, RUN, STOP, SAMPLING = (600, 1000, 1500, 2100, 2600), 360, 600, 6
-#: run and stop of tests that are cut without a rule [min]
+#: run and standstill of tests that are cut at fixed times [min]
 CUTS = ((90, 90), (120, 198), (156, 156), (198, 120), (180, 300), (240, 360), (300, 480))
 
 
@@ -58,7 +58,7 @@ def climate(daily: float, wander: float, begin: float) -> str:
 
 
 def with_gap(gap: Gap, rng: np.random.Generator) -> str:
-    """Return a protocol of six speeds in which one thing is missing."""
+    """Return a protocol of six speeds in which one condition is missing."""
     text = climate(0.0, 0.05, 8.0) if gap == "room" else climate(4.0, 0.6, rng.uniform(5, 11))
     text += segment(15)
     for share in rng.permutation(np.linspace(0.15, 0.5, 6) if gap == "speed" else np.linspace(0.2, 1.0, 6)):
@@ -76,7 +76,7 @@ def with_gap(gap: Gap, rng: np.random.Generator) -> str:
 
 
 def varied(rng: np.random.Generator) -> str:
-    """Return a protocol of all speeds, short and long runs and stops, in a room that changes."""
+    """Return a protocol of all speeds, short and long runs and standstills, with a changing room temperature."""
     text = climate(4.0, 0.6, rng.uniform(4, 10)) + segment(15)
     for _ in range(4):
         for share in rng.permutation([0.2, 0.4, 0.6, 0.8, 1.0]):
@@ -85,7 +85,7 @@ def varied(rng: np.random.Generator) -> str:
 
 
 def test_of(trial: Trial, gap: Gap) -> str:
-    """Return the protocol of a test; the room is what it was, but where the test is of the room."""
+    """Return the protocol of a test, in the climate of the recording unless the test changes the room temperature."""
     if trial.kind == "room":
         text = climate(5.0, 0.3, 4.0)
     else:
@@ -94,7 +94,7 @@ def test_of(trial: Trial, gap: Gap) -> str:
 
 
 def fills(gap: Gap, trial: Trial) -> bool:
-    """Return whether a test has what is missing."""
+    """Return whether a test fills the gap."""
     return {
         "speed": trial.speed > 0.6 * TOP,
         "stop": trial.kind == "stop" and trial.speed > 0.45 * TOP,
@@ -126,7 +126,7 @@ def rms(squares: NDArray[np.float64]) -> float:
 
 
 class Filled(NamedTuple):
-    """What the planner did with one gap."""
+    """Result of the planner for one gap."""
 
     gap: Gap
     best: Candidate
@@ -153,7 +153,7 @@ def fill(physics: Physics, seed: int) -> Filled:
 
 
 def chen(lengths: Sequence[tuple[float, float]], seed: int) -> list[Recording]:
-    """Record chen1996 with other lengths of run and stop [min]."""
+    """Record chen1996 with other durations of run and standstill [min]."""
     text = f'sampling = "{SAMPLING} min"\n'
     for speed, (run, stop) in zip(SPEEDS, lengths, strict=True):
         text += (
@@ -173,14 +173,14 @@ def cut(recording: Recording, rows: int) -> Recording:
 
 def stopped_after(recording: Recording, first: int, last: int) -> int:
     """Return the minutes after which the rule ends the phase that begins in a row."""
-    for row in range(first + 5, last):  # earlier it says nothing
+    for row in range(first + 5, last):  # no result before that
         if judge_running(cut(recording, row + 1), TARGETS).may_stop:
             return SAMPLING * (row - first)
     return SAMPLING * (last - first)
 
 
 def by_rule(seed: int) -> list[tuple[float, float]]:
-    """Return run and stop of each test as the rule ends them [min]."""
+    """Return the durations of run and standstill of each test, as ended by the rule [min]."""
     full = chen([(RUN, STOP)] * len(SPEEDS), seed)
     runs = [stopped_after(r, 1, 1 + RUN // SAMPLING) for r in full]
     again = chen([(run, STOP) for run in runs], seed)
@@ -190,7 +190,7 @@ def by_rule(seed: int) -> list[tuple[float, float]]:
 
 
 class Stopped(NamedTuple):
-    """What shorter tests cost."""
+    """Cost of shorter tests."""
 
     name: str
     share: float  #: of the time of the full tests
@@ -198,13 +198,13 @@ class Stopped(NamedTuple):
 
 
 def judged_on(learned: Sequence[Recording], full: Sequence[Recording]) -> float:
-    """Return the error on the full tests, each learned without [um]."""
+    """Return the error on the full tests, each left out of the training in turn [um]."""
     left = [unseen([r for j, r in enumerate(learned) if j != k], f) for k, f in enumerate(full)]
     return rms(np.concatenate(left))
 
 
 def stop_early(seed: int) -> list[Stopped]:
-    """Return what the rule, and fixed times, make of the tests of one seed."""
+    """Return the costs of ending the tests of one seed by the rule, and at fixed times."""
     full = chen([(RUN, STOP)] * len(SPEEDS), seed)
     none = judged_on(full, full)
     found = []
@@ -219,7 +219,7 @@ def stop_early(seed: int) -> list[Stopped]:
 
 
 def draw(found: Sequence[Sequence[Stopped]], path: Path) -> None:
-    """Draw the error over the time that tests take."""
+    """Plot the error over the duration of the tests."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
@@ -233,7 +233,7 @@ def draw(found: Sequence[Sequence[Stopped]], path: Path) -> None:
     ax.axhline(RATIO, color="#999999", ls="--", lw=0.8)
     ax.axvline(100 * SHARE, color="#999999", ls="--", lw=0.8)
     ax.set_xlabel("time of the tests [% of 5 x 16 h]")
-    ax.set_ylabel("unseen error, of that learned from full tests")
+    ax.set_ylabel("error on unseen data, relative to training with full tests")
     ax.set_ylim(bottom=0)
     ax.legend(frameon=False)
     figure.savefig(path, dpi=110)

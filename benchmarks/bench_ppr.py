@@ -1,9 +1,9 @@
-"""Projection pursuit regression against R's ``stats::ppr`` (Friedman's SMART): the same number of terms and freedom.
+"""Projection pursuit regression compared with R's ``stats::ppr`` (Friedman's SMART): same number of terms and freedom.
 
-Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_ppr.py``. R fits once with its spline of the same degrees of
-freedom, and once with its default smoother (supsmu). Agreement: the R2 of rows that neither has seen is not more than
-0.01 below that of R's spline, and where the truth is known it is within 0.01 of what the noise leaves. The R2 of the
-rows fitted to is printed beside it.
+Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_ppr.py``. R fits once with its spline with the same degrees of
+freedom, and once with its default smoother (supsmu). Agreement: the R2 on unseen rows is not more than 0.01 below that
+of R's spline and, where the true function is known, within 0.01 of the maximum that the noise permits. The R2 on the
+training rows is printed too.
 """
 
 import shutil
@@ -55,7 +55,7 @@ def ridges() -> tuple[FloatArray, FloatArray, int, int]:
 
 
 def machine() -> tuple[FloatArray, FloatArray, int, int]:
-    """Sixteen collinear temperatures and a drift that bends."""
+    """Sixteen collinear temperatures and a nonlinear drift."""
     X, y = network(12_000, 16, seed=20, bending=0.05)
     return X, y, 9000, 5
 

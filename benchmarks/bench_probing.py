@@ -1,8 +1,9 @@
-"""What probings take off: a model of other thermal cycles, probed in the cycle that it has not seen.
+"""Reduction of the error by probings: a model fitted to other thermal cycles is probed in an unseen one.
 
-Run with ``python benchmarks/bench_probing.py [--every "every 2 h"]``. Each cycle is left out in turn; the model and all
-numbers of the filter come from the other cycles, its size from those left out of them in turn. Errors are means over
-channels and cycles of the mean absolute error [um]; `held`: probings without a model.
+Run with ``python benchmarks/bench_probing.py [--every "every 2 h"]``. Each cycle is left out in turn. The model and all
+parameters of the filter are determined from the other cycles, the expected error by leaving out each of these in turn.
+Errors are means over channels and cycles of the mean absolute error [um]; `held`: each probing held until the next,
+without a model.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from thermocomp.recordings.stacking import stack
 from thermocomp.virtual.datasets import record
 
 METHODS = ("averaged", "dynamic", "ols")
-#: for `averaged` on fl_thermal, probed every 2 h: share of the error without, and the error itself [um]
+#: goals for `averaged` on fl_thermal, probed every 2 h: error relative to that without probings; error [um]
 GOALS = (0.8, 1.5)
 SIX = ("t4_C", "t5_C", "t7_C", "t9_C", "t11_C", "t16_C")
 
@@ -38,7 +39,7 @@ def cases() -> Iterator[tuple[str, Samples]]:
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
     if not path.is_file():
-        print(f"skipped: {path} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
         return
     found = recordings.read(path)
     samples = stack([found], [c.name for c in found.displacements])

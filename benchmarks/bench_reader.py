@@ -1,10 +1,10 @@
-"""Reading a long recording: processor time beside plain pandas, and peak memory against the table it becomes.
+"""Reading a long recording: processor time compared with pandas, and peak memory relative to the resulting table.
 
-Run it with ``python benchmarks/bench_reader.py [ROWS]``. The goal: a million rows in seconds, with a peak of at most
-2.5 times the float64 table. Plain pandas is told how the file is written, and looks at nothing.
+Run it with ``python benchmarks/bench_reader.py [ROWS]``. Goal: a million rows in seconds, with peak memory of at most
+2.5 times the float64 table. For pandas the format of the file is specified, and nothing is checked.
 """
 
-# The parent imports nothing big: on Linux a child's ru_maxrss starts at the size of the process that forked it.
+# The parent imports no large package: on Linux a child's ru_maxrss starts at the size of the process that forked it.
 import json
 import resource
 import subprocess
@@ -69,7 +69,7 @@ def measure(path: Path) -> dict[str, float]:
 
 
 def measure_pandas(path: Path, kind: str) -> float:
-    """Return the processor time of plain pandas [s]."""
+    """Return the processor time of pandas alone [s]."""
     import pandas as pd
 
     began = time.process_time()

@@ -1,8 +1,9 @@
-"""The virtual machine: how fast it is, beside its own full finite-element model, and how much memory a month takes.
+"""Speed of the virtual machine compared with its full finite-element model, and memory for a month.
 
-Run with ``python benchmarks/bench_simulation.py``. The reduced and the full model step the same heat in one run; their
-drifts must agree to 1 %. Goals: a 16-hour test of 14 temperatures at 10 s in less than 1 s; 35,000 steps a second,
-3,000 of the nonlinear machine; a month at 10 s within three times the table it becomes.
+Run with ``python benchmarks/bench_simulation.py``. The reduced and the full model compute the same heat input in one
+run; their drifts must agree to 1 %. Goals: a 16-hour test of 14 temperatures every 10 s in less than 1 s; 35,000 steps
+a second, 3,000 on the nonlinear machine; for a month of rows every 10 s, at most three times the memory of the
+resulting table.
 """
 
 import subprocess
@@ -40,7 +41,7 @@ def protocol(folder: str, hours: int) -> Path:
 
 
 def whole_test(path: Path) -> tuple[float, int]:
-    """Return seconds and rows of a test, without its soak's rows but with its time."""
+    """Return the computing time [s] and the rows of a test; the time includes the soak, the rows do not."""
     experiment = read_protocol(path)
     times = []
     for _ in range(3):
@@ -51,7 +52,7 @@ def whole_test(path: Path) -> tuple[float, int]:
 
 
 def steps(machine: MachiningCentre, *programmes: list[float]) -> list[float]:
-    """Return steps a second of a machine that runs programmes of speeds."""
+    """Return steps per second of a machine, at constant and at changing speeds."""
     air = Air(22.0)
     found = []
     for speeds in programmes:
@@ -111,7 +112,7 @@ print(tracemalloc.get_traced_memory()[1], test.values.nbytes)
 
 
 def memory(short: Path, month: Path) -> tuple[float, float]:
-    """Return the peak of what a month takes, and the size of its table [bytes]; in a process of its own."""
+    """Return the peak memory for a month and the size of its table [bytes]; runs in a separate process."""
     done = subprocess.run([sys.executable, "-c", CHILD, short, month], check=True, capture_output=True, text=True)
     taken, table = done.stdout.split()
     return float(taken), float(table)

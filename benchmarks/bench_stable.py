@@ -1,8 +1,8 @@
-"""Whether a verdict hangs on one thermal cycle: the demo's six, and each five of them.
+"""Does a verdict depend on a single thermal cycle? The six cycles of the demo, and each five of them.
 
-Run with ``python benchmarks/bench_stable.py [--seed 0]``. The machine goes through all six cycles each time; the
-displacements of the one that is left out are taken away, so it is neither learned from nor judged. Wanted: what is
-accepted with six cycles stays so with at least five of the six sets of five, and is refused with none.
+Run with ``python benchmarks/bench_stable.py [--seed 0]``. The machine runs through all six cycles each time; the
+displacements of the left-out cycle are removed, so it is used neither for training nor for validation. Goal: a model
+accepted with six cycles stays accepted with at least five of the six sets of five, and is refused with none.
 """
 
 import argparse
@@ -19,12 +19,12 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 
 METHODS = ("ols", "partial-f", "mra", "dynamic")
-#: sets of five with which what was accepted has to stay so
+#: number of sets of five with which an accepted model must stay accepted
 LEAST = 5
 
 
 def judged(samples: Samples, without: int | None, jobs: int) -> Comparison:
-    """Compare with one cycle's displacements taken away."""
+    """Compare with the displacements of one cycle removed."""
     deviations = samples.deviations.copy()
     if without is not None:
         deviations[samples.cycle == without] = np.nan

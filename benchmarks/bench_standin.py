@@ -1,10 +1,10 @@
-"""What a failed sensor costs from when it is reported: by what stands in for it, or by a correction that is held.
+"""Error after the failure of a sensor was reported, with its substitute value or with a correction that is held.
 
-Run with ``python benchmarks/bench_standin.py [instants]`` (5 per cycle: 20 in all). Of fl_thermal (rows 0-6668, all
-sensors and six) each thermal cycle is left out in turn; `averaged` and the watch know nothing of it. Every temperature
-fails in every way at random instants of it, two hours before its end at the latest. From the report on, if an hour is
-left of the cycle, the RMS error of what the compensator leaves is divided by that with all sensors well. Which models
-may continue without a sensor is judged on the other cycles, each of them left out in turn too.
+Run with ``python benchmarks/bench_standin.py [instants]`` (5 per cycle: 20 in all). Each thermal cycle of fl_thermal
+(rows 0-6668, all sensors and six) is left out of the training of `averaged` and of the watch. In this cycle every
+temperature fails in every way at random instants, two hours before its end at the latest. If an hour of the cycle
+remains after the report, the RMS of the residual from the report on is divided by that with all sensors intact. Which
+models may continue without a sensor is determined on the other cycles, by leaving out each of them in turn.
 """
 
 import os
@@ -38,21 +38,21 @@ SIX = ("t4_C", "t5_C", "t7_C", "t9_C", "t11_C", "t16_C")
 KINDS = ("dead", "stuck", "3 degC off", "1 degC/h")
 LEARNED = 6669
 INSTANTS = 5
-#: before the end of the cycle it fails at the latest; half of it has to be left after the report [s]
+#: latest failure before the end of the cycle; half of this time must remain after the report [s]
 AFTER = 2 * 3600.0
-#: goals: ratio with what stands in; harm above no compensation where the correction is held [-; um]
+#: goals: error ratio with the substitute; excess over no compensation if the correction is held [-; um]
 RATIO, MARGIN = 2.0, 1.0
 
 
 @dataclass(frozen=True)
 class Cost:
-    """A failure, and what it cost."""
+    """A failure and its effect on the error."""
 
     target: str
     sensor: str
     kind: str
     stood: bool  #: the model may continue
-    ratio: float  #: RMS error to that with all sensors well
+    ratio: float  #: RMS error relative to that with all sensors intact
     harm: float  #: RMS error minus that without compensation [um]
 
 
@@ -60,7 +60,7 @@ def cases() -> Iterator[tuple[str, Samples]]:
     shared = Path(__file__).resolve().parents[2] / "shared" / "data"
     path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
     if not path.is_file():
-        raise SystemExit(f"{path} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        raise SystemExit(f"{path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
     whole = stack([recordings.read(path)], list(TARGETS))
     samples = whole.take((np.arange(len(whole)) < LEARNED) & (np.arange(len(whole)) % 4 == 0))
     yield "fl_thermal, all", samples
@@ -68,7 +68,7 @@ def cases() -> Iterator[tuple[str, Samples]]:
 
 
 def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
-    """Return the sensors that each model may lose, judged on the other cycles: see `ErrorModel.may_lose`."""
+    """Return the sensors that each model may lose, determined on the other cycles: see `ErrorModel.may_lose`."""
     others = [c for c in np.unique(samples.cycle[samples.cycle >= 0]).tolist() if c != cycle]
     squares: dict[str, dict[str, float]] = {t: {} for t in TARGETS}
     for unseen in others:
@@ -86,7 +86,7 @@ def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
 def believed(
     watch: Watch, samples: Samples, failures: Sequence[tuple[int, int, str]], stop: int
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return what is let through, (stop, 1 + n_failures, n_inputs), and the row of each report; first: all well."""
+    """Return the inputs after the watch, (stop, 1 + n_failures, n_inputs), first without failures; report rows."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]
     runs = 1 + len(failures)
     state, report = begin(watch, runs=(runs,)), np.full(runs, stop)
@@ -111,7 +111,7 @@ def believed(
 
 
 def left(model: ErrorModel, samples: Samples, values: FloatArray, target: int) -> FloatArray:
-    """Return the deviation that a compensator leaves, (n_rows,) [um]."""
+    """Return the residual with the compensator, (n_rows,) [um]."""
     columns = [[c.name for c in samples.inputs].index(i.name) for i in model.inputs]
     n, limits = len(values), Limits(reading_age=float(np.median(np.diff(samples.time))))
     time, resting = samples.time[:n], samples.stands[:n]
@@ -121,7 +121,7 @@ def left(model: ErrorModel, samples: Samples, values: FloatArray, target: int) -
 
 
 def held(samples: Samples, residual: FloatArray, target: int, report: int) -> FloatArray:
-    """Return the deviation that is left if the correction is held from a row on, and then fades (n_rows,) [um]."""
+    """Return the residual if the correction is held from a row on and then fades, (n_rows,) [um]."""
     limits, found = Limits(), residual.copy()
     now = Correction(residual[report] - samples.deviations[report, target])
     for k in range(report + 1, len(residual)):
@@ -166,7 +166,7 @@ def _rms(values: FloatArray) -> float:
 
 def show(title: str, found: Sequence[Cost]) -> bool:
     """Print the table; return whether the goals are reached."""
-    print(f"{title}: RMS error from the report on, of that with all sensors well; goal {RATIO:g} with what stands in")
+    print(f"{title}: RMS error from the report on, relative to all sensors intact; goal {RATIO:g} with substitutes")
     for target in TARGETS:
         for kind in KINDS:
             of = [c for c in found if c.target == target and c.kind == kind and c.stood]
@@ -182,7 +182,7 @@ def show(title: str, found: Sequence[Cost]) -> bool:
         worst = max(stays, key=lambda c: c.harm)
         pairs = sorted({(c.target, c.sensor) for c in stays})
         print(
-            f"  held, then faded, {len(stays)} runs: at worst {worst.harm:+.1f} um RMS to no compensation "
+            f"  held, then faded, {len(stays)} runs: at worst {worst.harm:+.1f} um RMS above no compensation "
             f"({worst.target}, {worst.sensor}); {', '.join(f'{t} without {s}' for t, s in pairs)}"
         )
     return all(c.ratio <= RATIO if c.stood else c.harm <= MARGIN for c in found)
@@ -194,7 +194,7 @@ def main() -> int:
         cycles = np.unique(samples.cycle[samples.cycle >= 0]).tolist()
         reached &= show(title, [c for cycle in cycles for c in costs(samples, cycle, instants)])
     word = "reached" if reached else "MISSED"
-    print(f"goal, what stands in costs no more than {RATIO:g} times, nothing held does harm: {word}")
+    print(f"goal, at most {RATIO:g} times the error with substitutes, no harm by held corrections: {word}")
     return 0 if reached else 1
 
 

@@ -1,7 +1,7 @@
-"""Stepwise regression against the statsmodels recipe: the loop that refits OLS for every candidate.
+"""Stepwise regression compared with a loop over statsmodels that refits OLS for every candidate.
 
-Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_stepwise.py [--quick]``; ``--quick`` leaves the 324 terms out.
-Both sides use the same thresholds and must select the same terms; ours is the whole ``fit`` of the estimator.
+Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_stepwise.py [--quick]``; ``--quick`` omits the 324 terms.
+Both use the same thresholds and must select the same terms; ours is the whole ``fit`` of the estimator.
 """
 
 import sys
@@ -63,7 +63,7 @@ def network(n_rows: int, n_nodes: int, seed: int, bending: float) -> tuple[Float
 
 
 def recipe(frame: pd.DataFrame, y: FloatArray, rule: Rule, intercept: bool) -> list[str]:
-    """Select columns as one does with statsmodels alone."""
+    """Select columns with statsmodels alone."""
 
     def fit(names: list[str]) -> "sm.regression.linear_model.RegressionResultsWrapper":
         return sm.OLS(y, sm.add_constant(frame[names]) if intercept else frame[names]).fit()

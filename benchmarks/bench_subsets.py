@@ -1,9 +1,9 @@
-"""Exact best subsets against R's leaps, on simulated networks of collinear temperatures.
+"""Exact best subsets compared with R's leaps, on simulated networks of collinear temperatures.
 
-Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_subsets.py [--quick]``; ``--quick`` leaves out what takes leaps
-most of a minute. Leaps is timed inside R, without its start. Both sides must find the same set of every size, with the
-same sum of squares to six digits: leaps is seen to lose half of its own. Ours is timed twice: the search (factorisation
-of the data included), and with the certificate, for which each set is fitted again.
+Run with ``OMP_NUM_THREADS=1 python benchmarks/bench_subsets.py [--quick]``; ``--quick`` omits the tasks that take leaps
+most of a minute. leaps is timed inside R, without the start of R. Both must find the same set of every size, with the
+same sum of squares to six digits (leaps loses half of its digits on these data). Ours is timed twice: the search,
+including the factorisation of the data, and the search with the certificate, for which each set is fitted again.
 """
 
 import shutil

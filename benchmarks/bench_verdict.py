@@ -1,8 +1,8 @@
 """How often the verdict is wrong: accepted on noise, accepted though harmful, not accepted though good.
 
-Run with ``python benchmarks/bench_verdict.py [--recordings 500] [--only WORDS]``. All goes through `compare`: the
-methods are trained, replayed and judged as they are on the command line. A case is printed with the share of its
-recordings in which any of the methods was accepted, its 95 % interval, and the goal.
+Run with ``python benchmarks/bench_verdict.py [--recordings 500] [--only WORDS]``. All cases use `compare`: the
+methods are fitted, replayed and evaluated as on the command line. For each case, the share of the
+recordings in which any of the methods was accepted is printed, with its 95 % interval and the goal.
 """
 
 import argparse
@@ -40,7 +40,7 @@ SPREAD = 0.3
 
 @dataclass(frozen=True)
 class Case:
-    """A kind of recording, how it is judged, and what is wanted of the verdict."""
+    """A kind of recording, its validation scheme, and the required share of accepted models."""
 
     name: str
     make: Callable[[np.random.Generator], Samples]
@@ -73,7 +73,7 @@ def noise(rng: np.random.Generator, kind: str, rows: int, columns: int) -> Float
 
 
 def independent(kind: str, tests: int, cycles: int) -> Callable[[np.random.Generator], Samples]:
-    """Temperatures and drift that have nothing to do with each other."""
+    """Temperatures and drift that are independent of each other."""
 
     def make(rng: np.random.Generator) -> Samples:
         found = []
@@ -86,7 +86,7 @@ def independent(kind: str, tests: int, cycles: int) -> Callable[[np.random.Gener
 
 
 def continued(kind: str, files: int) -> Callable[[np.random.Generator], Samples]:
-    """Return what makes the same of one series that is cut into files."""
+    """Return a function that makes the same kind of recording by cutting one series into files."""
 
     def make(rng: np.random.Generator) -> Samples:
         x = noise(rng, kind, files * ROWS, SENSORS + 1)
@@ -101,11 +101,12 @@ def continued(kind: str, files: int) -> Callable[[np.random.Generator], Samples]
 def real(
     left: float, cycles: int, *, harm: float = 0.0, keep: bool = False
 ) -> Callable[[np.random.Generator], Samples]:
-    """Drift of which the sensors tell all but a share; the share differs between cycles. In one, harm may be done [um].
+    """Drift that the sensors determine up to a share, which differs between cycles; in one, harm may be done [um].
 
-    The sensors say the same but for their noise, as those of a machine nearly do. With `keep` what they cannot tell is
-    nowhere larger than the drift at its largest: the best of models does no harm. Without, it does in 8 % of the
-    recordings of six cycles with half left, and is refused with good reason.
+    All sensors measure the same apart from noise, which is nearly true on a real machine. With `keep`, the part of the
+    drift that the sensors do not determine is nowhere larger than the largest drift, so the best possible model does no
+    harm. Without `keep`, it does harm in 8 % of the recordings of six cycles with half of the drift left, and is
+    rightly refused.
     """
 
     def make(rng: np.random.Generator) -> Samples:
@@ -116,7 +117,7 @@ def real(
             while keep and np.abs(unknown).max() > np.abs(told + unknown).max():
                 told, unknown = parts(rng, left)
             drift = size * (told + unknown)
-            if harm and k == cycles - 1:  # the machine hardly moves, and the sensors say it does
+            if harm and k == cycles - 1:  # the machine hardly drifts, but the sensors indicate that it does
                 drift = 0.02 * size * told
                 told = told * harm / size
             x = 20 + 0.3 * size * told[:, None] + 0.05 * rng.normal(size=(ROWS, SENSORS))
@@ -127,7 +128,7 @@ def real(
 
 
 def parts(rng: np.random.Generator, left: float) -> tuple[FloatArray, FloatArray]:
-    """Return what the sensors tell of a drift of RMS 1, and the rest, which has nothing to do with it."""
+    """Return the part of a drift of RMS 1 that the sensors determine, and the rest, which is independent of them."""
     heat, other = smooth(rng), smooth(rng)
     other -= heat * (other @ heat) / (heat @ heat)
     share = min(left * np.exp(SPREAD * rng.normal()), 0.95)
@@ -135,7 +136,7 @@ def parts(rng: np.random.Generator, left: float) -> tuple[FloatArray, FloatArray
 
 
 def smooth(rng: np.random.Generator) -> FloatArray:
-    """Return a temperature that wanders from 0, up or down, as slowly as a machine's."""
+    """Return a temperature that drifts from 0, up or down, as slowly as that of a machine."""
     x = np.cumsum(np.cumsum(rng.normal(size=ROWS)) * 0.1 + rng.normal(size=ROWS))
     found: FloatArray = x - x[0]
     return found

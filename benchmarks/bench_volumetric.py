@@ -1,10 +1,10 @@
-"""The 32 components of a machine: synthesised at many points, and stepped and synthesised live at one.
+"""The 32 components of a machine: synthesis at many points, and step and synthesis at one point in live operation.
 
-Run with ``python benchmarks/bench_volumetric.py``. The machine has 18 position models of a profile of fifth order and
-one slope each, and 14 scalars: 32 models of time, half of them polynomials of 8 terms, half lags (8 each). All
-sides must say the same: the stack as the models stepped one by one, a batch of points as one point alone, and the first
-order as exact transforms within the second order of the angles. Goals: 100,000 points in at most 100 ms, one live
-evaluation (step, components, error) in at most 200 us (median).
+Run with ``python benchmarks/bench_volumetric.py``. The machine has 18 position models, each with a profile of fifth
+order and one slope, and 14 scalars: 32 models of time, half of them polynomials of 8 terms, half with 8 lags each. The
+results must agree: those of the stack with those of the models stepped one by one, a batch of points with single
+points, and the first-order sum with exact transforms, except for terms of second order in the angles. Goals: 100,000
+points in at most 100 ms, one evaluation in live operation (step, components, error) in at most 200 us (median).
 """
 
 import sys
@@ -37,7 +37,7 @@ READINGS = [{n: 32 - 12 * float(np.exp(-t / (2e3 + 1e3 * k))) for k, n in enumer
 
 
 def inputs(rng: np.random.Generator, count: int) -> tuple[Input, ...]:
-    """Return some of the temperatures; every model has ranges of its own, so that nothing can be shared."""
+    """Return some of the temperatures; every model has different trained ranges, so that nothing can be shared."""
     names = rng.choice(TEMPERATURES, count, replace=False).tolist()
     return tuple(Input(n, "temperature", "degC", 20.0, True, -5.0, 20.0 + rng.uniform(0, 1)) for n in names)
 
@@ -113,7 +113,7 @@ def median(job: Callable[[int], object], count: int, warm: int = 3) -> float:
 
 
 def agreed(mill: VolumetricModel, states: ThermalStates, points: FloatArray) -> bool:
-    """Say how far the ways to the same number are apart, and whether that is rounding and the order left out."""
+    """Print the differences between the methods, and whether they are due to rounding and neglected orders only."""
     alone = np.empty((200, len(mill.stack.models)))
     for column, model in enumerate(mill.stack.models):
         state = model.init()
@@ -128,7 +128,7 @@ def agreed(mill: VolumetricModel, states: ThermalStates, points: FloatArray) -> 
     difference = float(np.abs(warm.error(some, exact=True) - first).max())
     values, turns = np.abs(warm.components(some)), np.array([c.unit == "urad" for c in COMPONENTS])
     turned, moved = (float(values[:, which].sum(axis=1).max()) for which in (turns, ~turns))
-    # turns follow each other and turn what was moved before: angle^2 x way, angle x translation
+    # each rotation also rotates the displacements before it: angle^2 x distance, angle x translation
     bound = 1e-6 * turned * (1e-3 * turned * 3 * np.hypot(TRAVEL[1], TRAVEL[1]) + moved)
     print(f"stack against models one by one: {stacked:.1e}; one point against many: {batched:.1e} (goal 1e-12)")
     print(f"exact against first order: largest {difference:.3f} um of {np.abs(first).max():.0f} (bound {bound:.3f} um)")

@@ -1,8 +1,8 @@
-"""Puts wrong moves of NC programs back, one at a time: a test has to fail each time.
+"""Mutation test: reintroduce faults that caused wrong moves of NC programs, one at a time; a test must fail each time.
 
-Run with ``python benchmarks/nc_mutants.py [N1 proof ...]``: names of mutants, or how they begin; all if none is given.
-Source and tests are copied to a temporary folder. There the tests of all mutants have to pass; then each mutant of
-`nc_mutants.toml` is put into the source, and one of its tests has to fail. Exit 1 if one survives.
+Run with ``python benchmarks/nc_mutants.py [N1 proof ...]``: names of mutants, or their beginnings; all if none is
+given. Source and tests are copied to a temporary folder. There the tests of all mutants must pass; then each mutant of
+`nc_mutants.toml` is inserted into the source, and one of its tests must fail. Exit code 1 if a mutant is not detected.
 """
 
 import argparse
@@ -26,23 +26,23 @@ PATIENCE = 300
 
 
 class Mutant(NamedTuple):
-    """A fault that is put back."""
+    """A fault to be reintroduced."""
 
     name: str
     what: str
     file: str  #: of the package
-    old: str  #: stands there once
+    old: str  #: occurs once in the file
     new: str
     tests: list[str]  #: of which one has to fail
     also: Sequence[dict[str, str]] = ()  #: more to replace at once: file, old, new
 
 
 class StrayError(Exception):
-    """What a mutant replaces is not there, or more than once."""
+    """The text that a mutant replaces is missing, or occurs more than once."""
 
 
 def run(folder: Path, tests: Sequence[str], patience: float | None = None) -> tuple[int, str]:
-    """Run tests on the copy; return pytest's code and what it printed."""
+    """Run tests on the copy; return pytest's exit code and output."""
     command = [
         sys.executable,
         "-m",
@@ -67,7 +67,7 @@ def run(folder: Path, tests: Sequence[str], patience: float | None = None) -> tu
 
 
 def apply(mutant: Mutant, source: Path) -> dict[Path, str]:
-    """Put a mutant into the source; return the files as they were."""
+    """Insert a mutant into the source; return the original files."""
     before: dict[Path, str] = {}
     for file, old, new in (mutant[2:5], *((more["file"], more["old"], more["new"]) for more in mutant.also)):
         path = source / file
@@ -80,7 +80,7 @@ def apply(mutant: Mutant, source: Path) -> dict[Path, str]:
 
 
 def take_back(before: dict[Path, str]) -> None:
-    """Write files as they were."""
+    """Restore the original files."""
     for path, text in before.items():
         write(path, text)
 
@@ -93,7 +93,7 @@ def write(path: Path, text: str) -> None:
 
 
 def judge(mutant: Mutant, folder: Path) -> bool:
-    """Return whether a test sees a mutant; print a line."""
+    """Return whether a test detects a mutant; print a line."""
     begin = time.perf_counter()
     before = apply(mutant, folder / "src" / "thermocomp")
     code, said = run(folder, mutant.tests, PATIENCE)

@@ -1,9 +1,9 @@
-"""Random programs are revised, and judged by LinuxCNC's interpreter in eight states of the controller.
+"""Revise random programs, and check them with LinuxCNC's interpreter in eight states of the controller.
 
 Run with ``python benchmarks/nc_sweep.py --programs 2000 --seed 1``. Each seed gives one program, which is revised by
-both methods, for Z alone or for X, Y and Z. The judge (`tests/helpers/state_judge.py`) knows nothing of what
-the revision wanted. Printed are the counts, and why programs were refused. The folder of ``--found`` gets what was
-found, and what is wrong with both programs; a sweep that was interrupted continues with what is there.
+both methods, for Z alone or for X, Y and Z. The check (`tests/helpers/state_judge.py`) is independent of the revision.
+The counts and the reasons for refusals are printed. The results, and the original and revised program of every fault,
+are written to the folder of ``--found``; a sweep that was interrupted continues from there.
 """
 
 import argparse
@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"
 
 from sweeping import Counts, Outcome, sweep
 
-#: refused programs of the valid ones, at most
+#: maximum share of valid programs that are refused
 GOAL = 0.10
 
 
@@ -48,7 +48,7 @@ def main() -> int:
 
 
 def _read(log: Path) -> list[Outcome]:
-    """Return what was found before; a program that was interrupted between its two methods is not there."""
+    """Return the earlier results, without a program that was interrupted between its two methods."""
     if not log.exists():
         return []
     found = [Outcome(**json.loads(row)) for row in log.read_text(encoding="utf-8").splitlines() if row.endswith("}")]

@@ -1,4 +1,4 @@
-"""Run every benchmark, one after the other, each in a process of its own with one thread for linear algebra.
+"""Run all benchmarks, one after the other, each in a separate process with one thread for linear algebra.
 
 Run with ``python benchmarks/run.py [NAME ...]``, such as ``stepwise online``. Exit code 1 if a goal is missed.
 """
@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-#: take hours, or judge the verdict and no speed: run when they are named
+#: run only if named: they take hours, or do not measure speed
 BY_HAND = ("verdict", "stable", "bands", "plan", "watch", "linuxcnc")
 
 

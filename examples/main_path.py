@@ -1,4 +1,4 @@
-"""The main path in forty lines, from a recording to an axis: ``python examples/main_path.py``."""
+"""The main workflow in forty lines, from a recording to the correction of an axis: ``python examples/main_path.py``."""
 
 import asyncio
 from pathlib import Path
@@ -11,7 +11,7 @@ from thermocomp.runtime.compensator import Compensator
 
 
 async def main() -> float:
-    """Take a machine from its recordings to corrections; return the largest deviation that is left [um]."""
+    """Fit a model to recordings and correct another day with it; return the largest remaining error [um]."""
     with TemporaryDirectory() as folder:
         # virtual/verbs.py; for a file tc.read("drift.csv"), api/inputs.py
         *days, new_day = tc.simulate("wessel-milling")
@@ -21,22 +21,22 @@ async def main() -> float:
         assert best is not None, "no model may run"
         fitted = tc.fit(days, "s1_um", best, leave_one="file", jobs=1)  # judging/study.py; freeze(): models/linear.py
         path = fitted.save(Path(folder) / "model.json")  # files/modelfile.py
-        print(tc.assess(path, new_day))  # judged by a replay through the compensator: judging/replay.py
+        print(tc.assess(path, new_day))  # evaluated by a replay through the compensator: judging/replay.py
 
         (model,) = modelfile.read(path)  # core/model.py
         compensator = Compensator.of([model], tc.Limits(rate=1.0))  # runtime/compensator.py
         sink = FileSink(path=Path(folder) / "corrections.json")  # live/adapters/plain.py; the ports: core/ports.py
         await sink.connect(timeout=1.0)
-        state, left = compensator.start(), []  # state in, state out: runtime/state.py
+        state, left = compensator.start(), []  # all memory is in `state`: runtime/state.py
         names = [i.name for i in model.inputs]
         for time, row in zip(new_day.time, new_day.table.to_dict("records"), strict=True):
             reading = tc.Reading(float(time), {name: row[name] for name in names})  # core/reading.py
             state, result = compensator.step(state, reading, now=float(time))  # gate, watch, zero, model, limits
-            await sink.apply(result.corrections)  # one change of sign in all: core/correction.py
+            await sink.apply(result.corrections)  # the sign is changed in core/correction.py only
             left.append(row["s1_um"] - new_day.table["s1_um"].iloc[0] + result.corrections["s1_um"].offset)
         await sink.close()
         return float(max(map(abs, left)))
 
 
 if __name__ == "__main__":
-    print(f"at most {asyncio.run(main()):.1f} um are left of the new day")
+    print(f"at most {asyncio.run(main()):.1f} um of error remain on the new day")

@@ -1,4 +1,4 @@
-"""Count lines of code by room: what `make count` prints."""
+"""Count lines of code by package ("room"), as printed by `make count`."""
 
 import ast
 import io
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-#: beside Python: what is written by hand and shipped or run; C, structured text and shell count like it
+#: in addition to Python: hand-written files that are shipped or run
 OTHER = {".toml", ".html", ".j2", ".css", ".js", ".c", ".h", ".st", ".hal", ".ini", ".svg", ".sh"}
 
 

@@ -1,4 +1,4 @@
-"""Leaderboard: every model on every test, as one table. See README.md beside this file."""
+"""Leaderboard: every model on every test, as one table. See README.md in this folder."""
 
 import os
 
@@ -29,16 +29,18 @@ LOG = HERE / "published_block.md"
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="leaderboard", description=__doc__)
-    parser.add_argument("--models", help="only these, separated by commas")
-    parser.add_argument("--tests", help=f"only these of {', '.join(CASES)}")
+    parser.add_argument("--models", help="names of models, separated by commas (default: all)")
+    parser.add_argument("--tests", help=f"names of tests (default: all): {', '.join(CASES)}")
     parser.add_argument(
-        "--seconds", type=float, default=40.0, help="processor time, most per model and test (default 40)"
+        "--seconds", type=float, default=40.0, help="limit of the processor time per model and test [s] (default 40)"
     )
-    parser.add_argument("-o", "--output", type=Path, help="folder for board.json and board.md (default: this one)")
-    parser.add_argument("--published", metavar="MODEL", help="evaluate the published block of fl_thermal once, log it")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="folder for board.json and board.md (default: that of this script)"
+    )
+    parser.add_argument("--published", metavar="MODEL", help="evaluate MODEL on the published block, append to log")
     args = parser.parse_args()
     if not args.seconds > 0:
-        parser.error(f"--seconds {args.seconds:g}: want more than 0")
+        parser.error(f"--seconds {args.seconds:g}: expected more than 0")
     try:
         entries = models(HERE / "models")
         if args.published:
@@ -50,7 +52,7 @@ def main() -> int:
         found = make({name: entries[name] for name in names}, tests, args.seconds)
         page = table(found, log)
         print(page)
-        # a part of the board does not take the place of the whole, unless a folder is named
+        # a part of the board does not replace the whole one, unless a folder is named
         folder = args.output or (HERE if args.models is args.tests is None else None)
         if folder:
             folder.mkdir(parents=True, exist_ok=True)
@@ -73,7 +75,7 @@ def chosen(text: str | None, known: Any, what: str) -> list[str]:
 def make(entries: dict[str, Path | None], tests: list[str], seconds: float) -> dict[str, Any]:
     absent = {c: reason for c in tests if (reason := CASES[c].absent)}
     if len(absent) == len(tests):
-        raise InputError(f"nothing to judge on: {'; '.join(absent.values())}")
+        raise InputError(f"no test can be run: {'; '.join(absent.values())}")
     begun, code = datetime.now(UTC), commit()
     results: dict[str, dict[str, Any]] = {name: {} for name in entries}
     for name, case, result in run(entries, [c for c in tests if c not in absent], seconds):
@@ -109,7 +111,7 @@ def make(entries: dict[str, Path | None], tests: list[str], seconds: float) -> d
 
 
 def commit() -> str:
-    """Return the commit of the thermocomp that runs, with a plus where its code or this folder's was changed."""
+    """Return the commit of thermocomp in use, with a plus sign if its code or that of this folder was changed."""
     import thermocomp
 
     def git(*words: str) -> str:
@@ -124,7 +126,7 @@ def commit() -> str:
 
 
 def processor() -> str:
-    """Return what the processor is called."""
+    """Return the name of the processor."""
     info = Path("/proc/cpuinfo")
     named = re.search(r"^model name\s*:\s*(.+)$", info.read_text() if info.is_file() else "", re.MULTILINE)
     return named[1] if named else platform.processor() or platform.machine()

@@ -1,4 +1,4 @@
-"""Run models on tests, one after the other in a process of its own, and lay out what comes of it."""
+"""Run models on tests, one after the other in a separate process, and write the results as a table."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ def run(entries: Mapping[str, Path | None], cases: Sequence[str], seconds: float
     One that takes more than `seconds` of processor time (or ten times that, asleep), or kills its process, leaves
     nothing.
     """
-    for name in METHODS.keys() & entries.keys():  # compiled kernels are nobody's time
+    for name in METHODS.keys() & entries.keys():  # compilation of kernels is not timed
         _worker().submit(attempt, name, None, "hwang").result()
     for case in cases:
         for name, file in entries.items():
@@ -43,20 +43,20 @@ def run(entries: Mapping[str, Path | None], cases: Sequence[str], seconds: float
 
 
 def _worker() -> Any:
-    """Return the one process that works, its imports done."""
+    """Return the worker process, with its imports done."""
     executor = get_reusable_executor(max_workers=1, timeout=None)
     executor.submit(ready).result()
     return executor
 
 
 def rank(results: Mapping[str, Mapping[str, Found]]) -> list[str]:
-    """Return the models that gave a figure, the best first."""
+    """Return the models with a result, the best first."""
     given = [name for name, of in results.items() if any("error" not in f for f in of.values())]
     return sorted(given, key=lambda name: (score(results[name]), name))
 
 
 def score(of: Mapping[str, Found]) -> float:
-    """Return the mean of the shares of none; a test without a figure counts as none, 1."""
+    """Return the mean of the errors relative to no compensation; a test without a result counts as 1."""
     return float(sum(f.get("share_mae", 1.0) for f in of.values()) / len(of))
 
 
@@ -95,17 +95,18 @@ def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
         f"at most {board['limit']:g} s of processor time per model and test. Made by `python benchmarks/leaderboard`.",
         "",
         "Models alone, without gate and limits. Per test: mean over the channels of the mean absolute error in rows "
-        "that were not learned from [um]; what that is of no compensation, and the worst channel's share. Sorted by "
-        "`mean`: the mean of these shares over all tests; a test without a figure counts as no compensation, 100 %. "
-        "`noise`: share of the RMS of no compensation that is left with 0.4 degC of normal noise on every temperature, "
-        "the zero's included; `lost`: in the worst channel with the worst input lost. `inputs`: that the models use, a "
-        "spindle speed among them; `s`: processor time of all fits and replays. `published`: latest mean absolute "
-        "error on the published test block of fl_thermal [um], by [the log](published_block.md), not in `mean`. RMS, "
-        "single channels and the time of the fits alone are in `board.json`.",
+        "that were not used for training [um]; in brackets this error relative to that without compensation, and the "
+        "largest such ratio of a channel. Sorted by `mean`: the mean of these ratios over all tests; a test without a "
+        "result counts as no compensation, 100 %. `noise`: RMS relative to that without compensation with 0.4 degC of "
+        "normal noise on every temperature, also on the readings of the zero; `lost`: the same in the worst channel "
+        "with the most important input lost. `inputs`: number of inputs that the models use, including a spindle "
+        "speed; `s`: processor time of all fits and replays. `published`: latest mean absolute error on the published "
+        "test block of fl_thermal [um], from [the log](published_block.md), not included in `mean`. RMS, single "
+        "channels and the time of the fits alone are in `board.json`.",
         "",
         *(f"| {' | '.join(row)} |" for row in rows),
         "",
-        "| test | learned | judged | rows | no compensation [um] |",
+        "| test | training data | validation data | rows | no compensation [um] |",
         "|---|---|---|---:|---:|",
         *(
             f"| {c} | {t['learned']} | {t['judged']} | "
@@ -114,7 +115,7 @@ def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
             for c, t in tests.items()
         ),
         "",
-        *(["Without a figure:", ""] if notes else []),
+        *(["No result:", ""] if notes else []),
         *(f"- {name}: {', '.join(of)}: {' '.join(why.split())}" for (name, why), of in notes.items()),
     ]
     return "\n".join(lines).rstrip() + "\n"

@@ -1,4 +1,4 @@
-"""What the models are judged on: one line per test."""
+"""The tests on which the models are evaluated: one line per test."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -33,19 +33,19 @@ def displacements(found: Sequence[Recording]) -> list[str]:
 
 
 def virtual(experiment: str, leave_out: Callable[[Samples], Judging], every: int = 1, **how: Any) -> Made:
-    """Make an experiment, whole cycles or files of it left out in turn; `how` is passed to `record`."""
+    """Record an experiment of which whole cycles or files are left out in turn; `how` is passed to `record`."""
     found = record(experiment, **how)
     samples = thin(stack(found, displacements(found)), every)
     return samples, leave_out(samples)
 
 
 def thin(samples: Samples, every: int) -> Samples:
-    """Return every so many rows one: slow models get done, too."""
+    """Return every n-th row, so that slow models finish, too."""
     return samples.take(np.arange(len(samples)) % every == 0)
 
 
 def from_to(learn: str, judge: str, seed: int = 0, **how: Any) -> Made:
-    """Learn from all files of one experiment, judge on those of another, made with `seed`."""
+    """Train on all files of one experiment, validate on those of another, recorded with `seed`."""
     known, unseen = record(learn, **how), record(judge, seed=seed, **how)
     samples = stack([*known, *unseen], displacements(known))
     first = len(known)
@@ -53,7 +53,7 @@ def from_to(learn: str, judge: str, seed: int = 0, **how: Any) -> Made:
         Split(f"file {samples.test_names[k]}", samples.test < first, samples.test == k, whole=True)
         for k in range(first, len(samples.test_names))
     ]
-    return samples, Judging(f"{learn} to learn, {judge} unseen", tuple(blocks))
+    return samples, Judging(f"{learn} for training, {judge} unseen", tuple(blocks))
 
 
 def fl_thermal_cycles() -> Made:
@@ -77,12 +77,12 @@ class Case:
     ----------
     name : str
     learned, judged : str
-        In words.
+        Training and validation data, in words.
     make : callable
     stress : bool
-        Also with noise and each sensor lost.
+        Whether to test also with noise and with each sensor lost.
     needs : Path, optional
-        File without which it is skipped.
+        File required; the test is skipped if it is missing.
     """
 
     name: str
@@ -94,9 +94,9 @@ class Case:
 
     @property
     def absent(self) -> str:
-        """Why it has to be skipped; empty if it need not be."""
+        """Reason why the test is skipped; empty if it is not."""
         here = self.needs is None or self.needs.is_file()
-        return "" if here else f"{self.needs} is not here; set THERMOCOMP_DATA to the folder of the measured data"
+        return "" if here else f"{self.needs} is missing; set THERMOCOMP_DATA to the folder of the measured data"
 
 
 def on_virtual(physics: Physics) -> tuple[Case, ...]:
@@ -105,13 +105,13 @@ def on_virtual(physics: Physics) -> tuple[Case, ...]:
     return (
         Case(
             f"demo{own}",
-            "five of six cycles, each at a speed of its own, in a changing room, a row every 3 min",
-            "the sixth, each in turn",
+            "five of six cycles, each at another speed, with a changing room temperature, a row every 3 min",
+            "the sixth cycle, each in turn",
             partial(virtual, "demo", leave_one_cycle_out, every=9, physics=physics),
         ),
         Case(
             f"chen1996{own}",
-            "four of five speeds, 16 h each, from cold",
+            "four of five speeds, 16 h each, starting cold",
             "the fifth speed, each in turn",
             partial(virtual, "chen1996", leave_one_file_out, physics=physics),
             stress=True,
@@ -124,14 +124,14 @@ def on_virtual(physics: Physics) -> tuple[Case, ...]:
         ),
         Case(
             f"hwang{own}",
-            "37 rows: stop, low and high speed in random order, axes moving",
+            "37 rows: standstill, low and high speed in random order, axes moving",
             "the same in another order on another day",
             partial(from_to, "hwang", "hwang", seed=1, physics=physics),
         ),
         Case(
             f"stepwise2017{own}",
-            "one day of four cycles, X moving much",
-            "another day at other speeds and stops",
+            "one day of four cycles, with much motion of X",
+            "another day with other speeds and standstills",
             partial(from_to, "stepwise2017", "stepwise2017-online", physics=physics),
             stress=True,
         ),
@@ -144,7 +144,7 @@ CASES = {
         Case(
             "fl-thermal",
             "measured: a spindle, rows 0-6668, every eighth, three of the four thermal cycles",
-            "the fourth, each in turn (the last one without its end, which is in the published block)",
+            "the fourth cycle, each in turn (the last one without its end, which is in the published block)",
             fl_thermal_cycles,
             needs=FL_THERMAL,
         ),

@@ -1,4 +1,4 @@
-"""The published test block of fl_thermal: rare figures, kept in a log, for who looks often learns it by heart."""
+"""The published test block of fl_thermal: few evaluations, recorded in a log, so that it remains unseen."""
 
 import re
 from datetime import UTC, datetime
@@ -16,12 +16,12 @@ from thermocomp.judging.compare import compare
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.stacking import stack
 
-#: evaluations per model, in all
+#: maximum number of evaluations per model
 MOST = 3
 
 
 class Line(NamedTuple):
-    """A line of the log: date, commit, model and the temperatures it was given, five MAE and their mean [um]."""
+    """A line of the log: date, commit, model and its temperatures, five MAE and their mean [um]."""
 
     date: str
     commit: str
@@ -45,20 +45,20 @@ def read_log(path: Path) -> list[Line]:
 
 
 def evaluate(name: str, file: Path | None, log: Path, commit: str) -> Line:
-    """Judge a model, given all temperatures, on the published block as the published study does; append the line."""
+    """Evaluate a model with all temperatures on the published block, as in the published study; append the line."""
     before = {(line.date, line.commit) for line in read_log(log) if line.name == name}
     if len(before) >= MOST:
         raise InputError(
-            f"{name} was evaluated on the published block {len(before)} times ({log}): no more than {MOST}"
+            f"{name} was evaluated on the published block {len(before)} times ({log}); the maximum is {MOST}"
         )
     if not FL_THERMAL.is_file():
-        raise InputError(f"{FL_THERMAL} is not here; set THERMOCOMP_DATA to the folder of the measured data")
+        raise InputError(f"{FL_THERMAL} is missing; set THERMOCOMP_DATA to the folder of the measured data")
     model, _ = load(name, file)
     found = [recordings.read(FL_THERMAL)]
     samples = stack(found, displacements(found), zeroing=FIRST_READING)  # as in the published study
     result = compare(samples, [model], splits.parse("0.75/0.25", samples), robustness=False).overall()
     if why := next((a.failure for a in result if a.failure), ""):
-        raise InputError(f"{name} gives no figure for the published block: {why}")
+        raise InputError(f"{name} gives no result for the published block: {why}")
     errors = [a.metric("mae") for a in result]
     line = Line(
         datetime.now(UTC).date().isoformat(),

@@ -1,4 +1,4 @@
-"""Judge one model on one test: what a worker process does."""
+"""Evaluate one model on one test, in a worker process."""
 
 import runpy
 import signal
@@ -22,7 +22,7 @@ def _made(case: str) -> Made:
 
 
 def ready() -> None:
-    """Do nothing: whose process has run this has imported what it needs."""
+    """Do nothing: after this call the worker process has imported all modules."""
 
 
 def load(name: str, file: Path | None) -> tuple[str, str]:
@@ -37,10 +37,10 @@ def load(name: str, file: Path | None) -> tuple[str, str]:
 
 
 def attempt(name: str, file: Path | None, case: str, seconds: float = 0.0) -> dict[str, Any]:
-    """Return what `judge_model` finds, or why it finds nothing, as ``error``.
+    """Return the result of `judge_model`, or the reason for its failure as ``error``.
 
-    After more than `seconds` of processor time (0: never) the process is killed, whatever it is doing: what a model may
-    take does not depend on what else the machine does.
+    After more than `seconds` of processor time (0: never) the process is killed. Processor time is used because it does
+    not depend on other programs.
     """
     if hasattr(signal, "setitimer"):  # elsewhere only the parent watches
         signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -56,7 +56,7 @@ def attempt(name: str, file: Path | None, case: str, seconds: float = 0.0) -> di
 
 
 def judge_model(name: str, file: Path | None, case: str) -> dict[str, Any]:
-    """Return what a model leaves on a test; deviations in um, shares of what no compensation leaves."""
+    """Return the errors of a model on a test [um], also relative to those without compensation."""
     model, summary = load(name, file)
     samples, judging = _made(case)
     stress = CASES[case].stress
@@ -80,7 +80,7 @@ def judge_model(name: str, file: Path | None, case: str) -> dict[str, Any]:
         known = [a.robustness for a in whole if a.robustness]
         none_rms = np.mean([r.none_rms for r in known])
         found["noise_share_rms"] = float(np.mean([r.noise_rms["normal"][0] for r in known]) / none_rms)
-        # the worst of all channels: a machine is as good as its worst axis
+        # the worst of all channels: the worst axis determines the accuracy of a machine
         lost = max(known, key=lambda r: r.worst_lost[1] / r.none_rms)
         found["lost_share_rms"] = lost.worst_lost[1] / lost.none_rms if lost.lost_rms else found["share_rms"]
         found["lost_sensor"] = lost.worst_lost[0]

@@ -1,8 +1,8 @@
-"""Directive ``cli-help``: what a command prints when it is asked for help, taken from the real app at build time.
+"""Directive ``cli-help``: the help text of a command, printed by the program at build time.
 
     .. cli-help:: fit
 
-Without a name it is the help of the whole app.
+Without a name: the help text of the whole program.
 """
 
 import os

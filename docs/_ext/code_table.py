@@ -1,4 +1,4 @@
-"""Directive ``code-table``: the G and M codes that are followed and those that are refused, taken from the code.
+"""Directive ``code-table``: the G and M codes that are interpreted and those that are refused, from the source code.
 
 .. code-table:: linuxcnc
 """
@@ -19,19 +19,19 @@ class CodeTable(SphinxDirective):
     required_arguments: ClassVar[int] = 1
 
     def run(self) -> list[nodes.Node]:
-        """Return the followed codes in a line, and a table with the others and the reason."""
+        """Return the interpreted codes in a line, and a table of the others with the reasons."""
         self.env.note_dependency(str(codes.__file__))
         (controller,) = self.arguments
         known = [code for table in (codes.G_CODES, codes.M_CODES) for _, code in sorted(table[controller].items())]
         followed = ", ".join(f"``{c.name}``" for c in known if not c.refused)
-        lines = [f"Followed: {followed}.", ""]
+        lines = [f"Interpreted: {followed}.", ""]
         lines += [
             ".. list-table::",
             "   :header-rows: 1",
             "   :widths: 25 75",
             "",
             "   * - refused",
-            "     - why, and what to do",
+            "     - reason and remedy",
         ]
         for reason, same in groupby((c for c in known if c.refused), key=lambda c: c.refused):
             names = ", ".join(f"``{c.name}``" for c in same)

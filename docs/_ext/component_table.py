@@ -21,7 +21,7 @@ class ComponentTable(SphinxDirective):
         for group, heading in _GROUPS.items():
             found = [c for c in components.COMPONENTS if c.group == group]
             lines = [f".. list-table:: {heading}: {len(found)}", "   :header-rows: 1", "   :widths: 14 12 24 50", ""]
-            lines += ["   * - code", "     - unit", "     - depends on", "     - in words"]
+            lines += ["   * - code", "     - unit", "     - depends on", "     - description"]
             for c in found:
                 depends = "time" if c.is_scalar else f"time, position of {c.depends_on}"
                 lines += [f"   * - ``{c.code}``", f"     - {c.unit}", f"     - {depends}", f"     - {c.description}"]

@@ -15,7 +15,7 @@ class MethodTable(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Return a table with a row per method."""
         self.env.note_dependency(str(methods.__file__))
-        lines = [".. list-table::", "   :header-rows: 1", "   :widths: 20 80", "", "   * - name", "     - what it is"]
+        lines = [".. list-table::", "   :header-rows: 1", "   :widths: 20 80", "", "   * - name", "     - description"]
         for m in methods.METHODS.values():
             lines += [f"   * - ``{m.name}``", f"     - {m.summary}"]
         place = nodes.container()

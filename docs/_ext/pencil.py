@@ -1,4 +1,4 @@
-"""What ``tutorial/plot_conventions.py`` draws with: a projection, arrows, boxes, parts in plan view."""
+"""Drawing functions of ``tutorial/plot_conventions.py``: a projection, arrows, boxes, parts in plan view."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _SEEN = np.array([_RIGHT, np.cross(_VIEW, _RIGHT)])
 
 
 def see(points):
-    """Project (..., 3) to the paper (..., 2), in parallel."""
+    """Project points (..., 3) to the drawing plane (..., 2) by parallel projection."""
     return np.asarray(points, float) @ _SEEN.T
 
 

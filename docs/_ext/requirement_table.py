@@ -1,4 +1,4 @@
-"""Directive ``requirement-table``: what the papers ask for and what covers it, from ``requirements.toml``."""
+"""Directive ``requirement-table``: the requirements of the papers, and what covers each, from ``requirements.toml``."""
 
 import tomllib
 from pathlib import Path
@@ -19,7 +19,7 @@ class RequirementTable(SphinxDirective):
         place = nodes.container()
         for group in tomllib.loads(path.read_text(encoding="utf-8")).values():
             lines = [f".. list-table:: {group['title']}", "   :header-rows: 1", "   :widths: 10 40 50", ""]
-            lines += ["   * - id", "     - what", "     - covered by"]
+            lines += ["   * - id", "     - requirement", "     - covered by"]
             for key, entry in group.items():
                 if key == "title":
                     continue

@@ -1,6 +1,6 @@
 """
-Chen, Yuan, Ni 1996: regression and net
-=======================================
+Chen, Yuan, Ni 1996: regression and neural network
+==================================================
 
 *Thermal Error Modelling for Real-Time Error Compensation*, International Journal of Advanced Manufacturing Technology
 12. A horizontal machining centre is warmed up at five spindle speeds, and the drift of its tool point is predicted from
@@ -8,8 +8,8 @@ nine temperatures: by multiple regression analysis (MRA) with stepwise selection
 and by an artificial neural network. Then both are tested on unseen data, with noise, and with a sensor cut off.
 
 This page does the same on the virtual machining centre. It is not Chen's machine, so numbers differ; the question is
-whether the paper's statements about the methods also hold here. Its main result is judged at the tool point, on a
-dimension along Y, and in the whole work volume.
+whether the paper's statements about the methods also hold here. The paper's main result is checked at the tool point,
+on a dimension along Y, and in the whole work volume.
 """
 
 # %%
@@ -50,7 +50,7 @@ def show(*numbers: int) -> None:
 
 
 def tell(*identifiers: str) -> None:
-    """Print what the paper says, and what came out here."""
+    """Print the paper's claims and the results here."""
     for c in study.claims:
         if not set(identifiers) & set(c.ids):
             continue
@@ -65,7 +65,7 @@ judged = [c for c in study.claims if c.holds is not None]
 print(f"{sum(bool(c.holds) for c in judged)} of {len(judged)} claims hold on this machine")
 
 # %%
-# 810 sets from five tests
+# 810 rows from five tests
 # ------------------------
 #
 # 600, 1000, 1500, 2100 and 2600 1/min, each for 6 h, followed by 10 h at standstill; a row every 6 minutes. Of 24
@@ -96,12 +96,13 @@ assert all(numbers[f"n_effective_mra_{t}"] < 810 / 2 for t in "xyz")
 draw("fig3", "fig4", "fig5")
 
 # %%
-# The net
-# -------
+# The neural network
+# ------------------
 #
 # Nine temperatures as inputs, twenty hidden nodes, three drifts as outputs; sigmoids in both layers, weights updated
 # after every pattern. The result of training depends on the initial weights, so the network is trained five times: the
-# median is judged, the smallest and largest errors are reported, and the network with the median error is plotted.
+# claims are checked for the median error, the smallest and largest errors are reported, and the network with the median
+# error is plotted.
 
 tell("C-26", "C-28", "C-30", "C-31")
 show(5)
@@ -117,8 +118,9 @@ draw("fig10", "fig11", "fig12")
 # ------------------------------------
 #
 # A laser measures the positioning error of Y along its travel, 51 times in a warm-up and cool-down. The cold profile is
-# geometric; the thermal part added to it is nearly a straight line whose slope drifts. So one number, the slope, is
-# modelled in place of twelve. Fig. 6: some of the profiles. Fig. 1: the pitch of Y, measured at the same time.
+# geometric; the thermal part added to it is nearly a straight line whose slope changes with time. So one number, the
+# slope, is modelled in place of twelve. Fig. 6: some of the profiles. Fig. 1: the pitch of Y, measured at the same
+# time.
 
 draw("fig6", "fig1")
 tell("C-22", "C-05")
@@ -127,30 +129,31 @@ assert numbers["slope_sets"] == 51
 assert numbers["lateral_measured_um"] < 0.2 * numbers["lateral_none_um"]
 
 # %%
-# Figs. 7 and 13: the slope over time, and the fits by regression and by the 5-8-1 net.
+# Figs. 7 and 13: the slope over time, and the fits by regression and by the 5-8-1 network.
 
 draw("fig7", "fig13")
 
 # %%
-# Do 51 profiles tell the law?
-# ----------------------------
+# Can the law be identified from 51 profiles?
+# -------------------------------------------
 #
-# The regression keeps a few of 20 terms, and the paper interprets them as a law. Whether this is correct cannot be seen
-# from the fit: in one warm-up all temperatures rise together, one term can replace another, and the wrong terms predict
-# the slope equally well. So Eq. 6 and 8 are imposed on the virtual machine's temperatures, noise is added to laser (0.3
-# um) and sensors (0.05 degC), and the identification of the law is repeated many times, with different weather and
-# noise.
+# The regression keeps a few of 20 terms, and the paper interprets them as the physical law of the slope. Whether this
+# is correct cannot be seen from the fit: in one warm-up all temperatures rise together, one term can replace another,
+# and the wrong terms predict the slope equally well. So profiles are computed by Eq. 6 and 8 from the virtual machine's
+# temperatures, noise is added to laser (0.3 um) and sensors (0.05 degC), and the identification of this known law is
+# repeated many times, with different weather and noise.
 #
-# Two conditions make it identifiable. Effects that are to be distinguished must be heated separately: three tests of 17
-# profiles, in which the spindle heats the column's front, the Y axis its own drive, and a heating mat the column's rear
-# right; each profile is the mean of five runs (``thermocomp simulate chen1996-law``). And temperatures and slopes must
-# be relative to the mean state of their test. Relative to the cold state, nearly all changes of a test have one sign, a
-# square is almost proportional to its temperature, and the stepwise selection includes wrong products in its first
-# steps, however little noise there is; and all slopes of a test share the noise of its one cold profile. Allowing
-# products only after their factors helps. For use on the machine the coefficients are the same with any reference, only
-# the cold profile is not.
+# Two conditions make it identifiable. First, the parts whose effects are to be distinguished must be heated separately:
+# in three tests of 17 profiles, the spindle heats the column's front, the Y axis heats its own drive, and a heating mat
+# heats the column's rear right; each profile is the mean of five runs (``thermocomp simulate chen1996-law``). Second,
+# temperatures and slopes must be relative to the mean state of their test. Relative to the cold state, nearly all
+# changes of a test have one sign, a square is almost proportional to its temperature, and the stepwise selection
+# includes wrong products in its first steps, however little noise there is; and all slopes of a test share the noise of
+# its one cold profile. It helps to admit products only after their factors. For use on the machine the reference
+# changes only the cold profile, not the coefficients.
 #
-# The network fits equally well. It has no terms, and also uses inputs that are not part of the law.
+# The network fits equally well, but has no terms that could be interpreted, and also uses inputs that are not part of
+# the law.
 
 tell("C-23", "C-24", "C-27")
 show(9, 10)
@@ -176,8 +179,8 @@ assert numbers["rms_z_random_dynamic_um"] < 0.3 * numbers["rms_z_random_none_um"
 # Noise and a lost sensor
 # -----------------------
 #
-# Noise of 0.4 degC on all temperatures, including the zero reading; then the spindle temperature constantly reads no
-# rise, which is not detected. Figs. 16 and 17:
+# First, noise of 0.4 degC on all temperatures, including the readings of the zero; then the loss of the spindle
+# temperature, which stays at its zero without being detected. Figs. 16 and 17:
 
 draw("fig16", "fig17")
 tell("C-33", "C-34")
@@ -187,13 +190,13 @@ assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 # Ten times better?
 # -----------------
 #
-# The paper's main result, on the two new tests, on another day of the Y axis, and in the whole work volume. The error
-# of the fit is not used here: these are errors that a part would have had.
+# The paper's main result is checked on the two new tests, on another day of the Y axis, and in the whole work volume.
+# The errors are those on unseen data, which a part would have had, not residuals of the fit.
 #
 # For the volume all six components of each axis are measured by lasers in several thermal states, and the drift at one
 # point by a nest of probes, on eight days of work; each component becomes a cold profile and thermal slopes. On two
 # other days, at a thousand random points and instants, the machine is then corrected by the predictions of these
-# models, and judged by its true error.
+# models, and the remaining true error is evaluated.
 
 tell("C-01", "C-05", "C-06", "C-35")
 draw("volume")

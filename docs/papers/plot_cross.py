@@ -2,9 +2,9 @@
 The methods on all experiments
 ==============================
 
-Each paper tests its own method on its own machine. Here every method is trained on every paper's experiment and judged
-on unseen tests: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv`` adds your
-own recordings, ``--models all`` the slower methods.
+Each paper tests its own method on its own machine. Here every method is fitted to every paper's experiment and
+evaluated on unseen tests: other speeds, other days. ``thermocomp papers cross`` prints the same; ``--with drift.csv``
+adds your own recordings, ``--models all`` the slower methods.
 """
 
 # %%
@@ -22,8 +22,8 @@ assert numbers["chen1996, z_um, dynamic: rms_um"] < 0.2 * numbers["chen1996, z_u
 
 # %%
 # No method is best everywhere. The method with the closest fit is not the best on the unseen test: compare the first
-# two columns. Also consider the last columns before relying on any method: the effect of noise, and that of the worst
-# sensor if it reads no rise at all without being detected.
+# two columns. Before relying on any method, also consider the last columns: the effect of noise, and the effect of
+# losing the most important sensor without detection (it stays at its zero).
 
 print(page.format_table(details[0]))
 print()
@@ -38,7 +38,7 @@ plt.show()
 print(figure.caption)
 
 # %%
-# Is a method better than no compensation at all? On these machines nearly always. On a measured machine this is less
-# certain: the front page of the project shows the same methods on one.
+# Is a method better than no compensation at all? On the virtual machines nearly always. On a measured machine this is
+# less certain: see :doc:`/real_machine`.
 
 print(page.text(study))

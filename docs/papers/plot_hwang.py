@@ -1,6 +1,6 @@
 """
-Hwang, Lee, Yang: grouping and choice of variables
-==================================================
+Hwang, Lee, Yang: grouping and selection of variables
+=====================================================
 
 *Optimal Variable Selection in a Thermal Error Model for Real Time Error Compensation*. A machining centre is stopped,
 or runs slowly or fast, in random order, for six hours; 14 temperatures and the drift of Z are recorded. Correlated
@@ -9,7 +9,7 @@ paper it is as accurate as an engineer's choice, quicker to find, better conditi
 errors.
 
 This page does the same on the virtual machining centre; ``thermocomp papers hwang`` prints the same. The paper's
-figures are based on about 32 rows of one machine. Ours is a different machine, so numbers differ; the question is
+results are based on about 32 rows of one machine. Ours is a different machine, so numbers differ; the question is
 whether the paper's statements about the method hold.
 """
 
@@ -82,8 +82,8 @@ print(page.format_table(study.tables[1]))
 assert numbers["smallest_eigenvalue_degC2"] > numbers["smallest_eigenvalue_without_grouping_degC2"] > 0
 
 # %%
-# The effect of the threshold. The more groups, the closer the fit, and the worse the condition; a better fit is not
-# always better on new tests.
+# The figure shows the effect of the threshold. The more groups, the closer the fit and the larger the condition number;
+# a better fit is not always better on new tests.
 
 draw("hwang-thresholds")
 
@@ -91,7 +91,7 @@ draw("hwang-thresholds")
 # Errors of the sensors
 # ---------------------
 #
-# A hundred times, a random error is added to every temperature, and R2 is computed again: the R2 of a model with
+# In 100 draws, a random error is added to every temperature, and R2 is computed again. The R2 of a model with
 # squares varies more than that of a linear one.
 
 draw("hwang-fig6")

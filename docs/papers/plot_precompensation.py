@@ -2,14 +2,14 @@
 Pre-compensation: the drift from the spindle speed alone
 ========================================================
 
-The paper, of which only a part is available, uses no temperatures. The next drift follows from the last one and from
-the spindle speed, which is specified in the NC program; so the drift of a whole program can be computed beforehand,
-every ten minutes, and its negative added to Z. A neural network learns the coefficients; depth differences between
+The paper, of which only a part is available, uses no temperatures. The drift ten minutes ahead is computed from the
+present drift and the spindle speed, which is specified in the NC program; so the drift of a whole program can be
+computed beforehand, and its negative added to Z. A neural network learns the coefficients; depth differences between
 surfaces milled cold and after an hour decreased from 7 to 2 um.
 
 This page does the same on the virtual machining centre, in a measuring room; ``thermocomp papers precompensation``
-prints the same. The cutting tests are done twice: with the schedule of corrections, applied to the depths; and with NC
-programs, revised in the same way as by ``thermocomp revise``, read back and milled.
+prints the same. The cutting tests are done twice: once by applying the schedule of corrections to the depths, and once
+with NC programs that are revised as by ``thermocomp revise``, read back and milled.
 """
 
 # %%
@@ -34,8 +34,8 @@ def draw(key: str) -> None:
 print(page.headline(study))
 
 # %%
-# How long a memory
-# -----------------
+# Orders of the model
+# -------------------
 #
 # The numbers of past drifts k and of past speeds m are selected by the final prediction error, which is the error one
 # step ahead with a penalty for every coefficient.
@@ -51,8 +51,8 @@ assert numbers["k"] >= 1
 # --------
 #
 # For a prediction one step ahead, the model is given the measured drift of ten minutes ago, which no machine in
-# production has. So all models are judged in free run: from the start of the test on, the speed is the only input of a
-# model. The speeds of the test do not occur in the training data.
+# production has. So all models are evaluated in free run (simulation): from the start of the test on, the speed is the
+# only input of a model. The speeds of the test do not occur in the training data.
 
 print(page.text(study, "P-03", "P-05", "E-P3"))
 draw("precompensation-fig4")
@@ -93,18 +93,18 @@ draw("precompensation-surfaces")
 assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["program_depth_difference_cold_um"]
 
 # %%
-# What it cannot know
-# -------------------
+# Effects that the model does not include
+# ---------------------------------------
 #
-# A program that begins when the machine is still warm from the previous one, and a room temperature that changes.
+# A program that begins while the machine is still warm from the previous one, and a changing room temperature:
 
 print(page.text(study, "E-P5", "E-P6"))
 draw("precompensation-warm")
 assert numbers["room_peak_to_peak_um"] > 1
 
 # %%
-# The same with NC programs: an initial state that is wrong by half an hour does more harm than no revision; the state
-# at the end of the last job does none.
+# The same with NC programs: if the initial state is wrong by half an hour, the revised program is worse than the
+# original; with the state at the end of the last job, it is better.
 
 print(page.format_table(study.tables[6]))
 draw("precompensation-programs")

@@ -8,7 +8,7 @@ enters and none leaves; five remain. On-line, the five predict the drift of X be
 than projection pursuit, with a residual below 5 um.
 
 This page does the same on the virtual machining centre; ``thermocomp papers stepwise2017`` prints the same. The paper
-compares its models on-line without specifying the conditions; we use another day with other speeds.
+compares its models on-line without specifying the conditions; here this is another day with other speeds.
 """
 
 # %%
@@ -42,8 +42,8 @@ draw("stepwise2017-fig2")
 assert numbers["temperatures"] == 24
 
 # %%
-# The choice
-# ----------
+# The selection
+# -------------
 #
 # A temperature enters with a partial F of 100 or more, and leaves below 50.
 
@@ -64,8 +64,8 @@ print(page.format_table(study.tables[1]))
 assert numbers["rms_online_um"] < 0.5 * numbers["rms_online_none_um"]
 
 # %%
-# Robust?
-# -------
+# Robustness
+# ----------
 #
 # The paper claims robustness without evidence. Noise on every temperature, and one sensor lost at a time:
 

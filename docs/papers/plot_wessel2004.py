@@ -40,8 +40,8 @@ def show(*numbers: int) -> None:
 print(page.headline(study))
 
 # %%
-# A spindle of finite elements
-# ----------------------------
+# A finite-element spindle
+# ------------------------
 #
 # Three temperatures and two displacements of a spindle without sensor errors, 199 rows of 100 s. The curves are fitted
 # to one regime of rotations. Fig. 2a: the reference series.
@@ -89,8 +89,8 @@ assert numbers["sets_small"] == 129
 assert numbers["sets_best_psi"] > 0.99
 
 # %%
-# The resting tool
-# ----------------
+# The heated tool at rest
+# -----------------------
 #
 # The tool is heated from behind and at its tip; because of a break, the training data includes the fast warm-up twice.
 # Figs. 5 and 6:
@@ -108,7 +108,7 @@ assert numbers["tool_own_set_ace_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 assert numbers["tool_own_set_mlr_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 
 # %%
-# The loops of the tool, one for each temperature:
+# The displacement over each temperature of the tool, with a loop for each:
 
 draw("tool-loops")
 

@@ -1,18 +1,18 @@
 """
-The conventions, drawn
-======================
+Sign conventions in drawings
+============================
 
-Which direction is positive? All figures on this page are drawn from the results of `thermocomp.volumetric`: exact
-transforms with errors enlarged several thousand times to make them visible. The numbers next to them are asserted when
-the page is built. The conventions in words: :doc:`../volumetric`.
+Which direction is positive? All figures on this page are drawn from results of `thermocomp.volumetric`: exact
+transforms with errors enlarged several thousand times to make them visible. The numbers next to them are checked when
+the page is built. :doc:`../volumetric` describes the conventions in words.
 
 In all drawings the **commanded** state is grey and dashed, the **actual** state is black, and the orange arrow is the
 error: actual minus commanded, tool relative to workpiece.
 """
 
 # %%
-# The sections below need a machine of a given structure whose axes were measured at zero, and the error of its tool tip
-# for some components, all others being zero.
+# The sections below need a machine of a given structure whose axes were measured at position zero, and the error of its
+# tool tip if some components are given and all others are zero.
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def error(of, components, at=(0, 0, 0), tool=(0, 0, 0)):
 
 # sphinx_gallery_start_ignore
 def moved(of, components, places, at=(0, 0, 0)):
-    """Return where places of the last body really are [mm], (n, 3), for components as large as one likes."""
+    """Return the actual positions of points of the last body [mm], (n, 3), for components of any size."""
     places = np.asarray(places, float)
     off = [exact.error(of, values(components), np.asarray(at, float), p) for p in places]
     return np.asarray(at, float) + places + 1e-3 * np.array(off)
@@ -58,8 +58,8 @@ def moved(of, components, places, at=(0, 0, 0)):
 
 # sphinx_gallery_end_ignore
 # %%
-# Axes and turns
-# --------------
+# Axes and rotations
+# ------------------
 #
 # X, Y and Z are those of ISO 841: Z along the spindle, positive where tool and workpiece move apart. A, B and C are the
 # rotations about X, Y and Z. They are positive by the right-hand rule: thumb along the axis, fingers in the positive
@@ -145,7 +145,7 @@ for ax, (name, across, along) in zip(axes, (("C0Y", "X", "Y"), ("B0Z", "X", "Z")
     i, j = "XYZ".index(across), "XYZ".index(along)
 
     def shown(way, i=i, j=j, name=name):
-        """Return where the axis is when told to go to `way`, in the drawing's plane, 25,000 times too large."""
+        """Return the actual position for a commanded `way`, in the drawing's plane, with errors enlarged."""
         at = np.eye(3)[j] * way
         return (at + 25.0 * np.array(error(three, {name: 12}, at=at)))[[i, j]]
 
@@ -195,7 +195,7 @@ for ax, (name, across) in zip(axes, (("A0C", "Y"), ("B0C", "X")), strict=True):
     k = "XYZ".index(across)
 
     def shown(shape, k=k, name=name):
-        """Return where places of the spindle are, tilted 8,000 times too much."""
+        """Return the actual positions of points of the spindle, with the tilt enlarged 8,000 times."""
         places = np.zeros((len(shape), 3))
         places[:, k], places[:, 2] = np.asarray(shape, float).T
         return moved(mill, {name: 30 * 8000}, places)[:, [k, 2]]
@@ -226,8 +226,8 @@ for ax, (name, across) in zip(axes, (("A0C", "Y"), ("B0C", "X")), strict=True):
 plt.show()
 # sphinx_gallery_end_ignore
 # %%
-# Levers, and who moves
-# ---------------------
+# Levers, and which side moves
+# ----------------------------
 #
 # A component is the motion of the tool side relative to the workpiece side, whichever of them moves. In the upper row
 # the yaw of X is 20 urad. On the left a column carries the tool along X and rotates to the left. On the right a table
@@ -241,8 +241,9 @@ assert error(machine("w X' b Y Z (C1) t"), yaw_x, at=(0, 400, 0)) == [-8, 0, 0]
 
 # %%
 # The lower row shows the yaw of Y, with X 400 mm from the position at which this yaw was measured. On the left the
-# gantry carries X, so X is a lever. On the right the saddle rotates together with the table on it, about the tool; X is
-# on the workpiece side of Y and does not contribute to the lever. This is the only effect of the structure code.
+# gantry carries X, so the position of X is a lever. On the right the saddle rotates together with the table on it,
+# about the tool; X is on the workpiece side of Y and does not contribute to the lever. This is the only effect of the
+# structure code.
 
 assert error(machine("w b Y X Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 8, 0]
 assert error(machine("w X' Y' b Z (C1) t"), yaw_y, at=(400, 0, 0)) == [0, 0, 0]
@@ -285,7 +286,7 @@ pencil.cross(ax, spot)
 pencil.arrow(ax, (spot[0], 400), (0, 400), pencil.ORANGE, lw=2.6, size=15, z=9)
 pencil.lever(ax, (-75, 0), (-75, 400), "lever\n400 mm", (-85, -60))
 pencil.label(ax, (-185, 475), "d$_X$ = \u22128 um", pencil.ORANGE, size=12)
-pencil.label(ax, (spot[0] + 25, spot[1]), "ought to be\nunder the tool", size=9, ha="left")
+pencil.label(ax, (spot[0] + 25, spot[1]), "should be\nunder the tool", size=9, ha="left")
 
 ax = axes[1, 0]
 pencil.part(ax, pencil.rectangle(-330, 490, 110, 490), z=1)

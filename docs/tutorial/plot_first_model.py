@@ -4,7 +4,7 @@ From a drift test to a compensation
 
 A machining centre warms up and its tool point drifts. In this tutorial we record a drift test, find out which method
 predicts the drift best on unseen thermal cycles, fit that method, and let the model correct the machine reading by
-reading; one sensor fails meanwhile. The machine is a virtual one, so the numbers are reproducible; files from a real
+reading, while one sensor fails. The machine is a virtual one, so the numbers are reproducible; files from a real
 machine are processed in the same way from step 2 on.
 """
 
@@ -45,11 +45,11 @@ for cycle in recording.cycles:
 # %%
 # With your own files this step is ``recording = thermocomp.recordings.readers.recordings.read("drift.csv")``.
 #
-# 2. Is the recording sound?
-# --------------------------
+# 2. Are the data usable?
+# -----------------------
 #
-# `~thermocomp.recordings.checks.quality.check` looks for gaps, for sensors that are stuck, spike or were never
-# connected, and for the numbers that instruments write in place of a missing value.
+# `~thermocomp.recordings.checks.quality.check` looks for gaps, spikes, sensors that are stuck or were never connected,
+# and the numbers that instruments write in place of a missing value.
 
 findings = check(recording)
 for f in findings:
@@ -84,8 +84,8 @@ plt.show()
 # responds within minutes, the bed within hours, and the room temperature has a daily cycle. Bottom: the drift. It
 # follows the bearing at first and the slow parts later, which is why a single temperature sensor is not sufficient.
 #
-# 3. Which method, on cycles it has not seen?
-# -------------------------------------------
+# 3. Which method is best on unseen cycles?
+# -----------------------------------------
 #
 # Each thermal cycle is left out in turn; every method is trained on the other five and then replayed on the one left
 # out, with temperatures and spindle speed only. Temperatures are relative to the start of the test, like the
@@ -124,7 +124,7 @@ for ax, block in zip(axes.flat, blocks, strict=True):
     ax.axhline(0, color="0.7", linewidth=0.8)
     ax.plot(t, block.measured, color="0.3", label="measured")
     ax.plot(t, block.predicted, "--", label="predicted")
-    ax.plot(t, block.measured - block.predicted, label="residual: what compensation leaves")
+    ax.plot(t, block.measured - block.predicted, label="residual: error with compensation")
     rms, none = block.metric("rms"), block.none_metric("rms")
     ax.set_title(f"{block.block}\nRMS {rms:.1f} instead of {none:.1f} um", fontsize="small")
 for ax in axes[1]:
@@ -144,7 +144,8 @@ plt.show()
 # -----------------
 #
 # The best method is fitted to all six cycles and frozen into plain numbers. The model stores its error on unseen
-# cycles, not the optimistic error of the fit. Before it is written, it is tested with noise and lost sensors.
+# cycles, not the residual of the fit, which would be too optimistic. Before it is written, it is tested with noise and
+# lost sensors.
 
 model = study.fit(samples, best.model, judging).models[0]
 honest = model.honest_error
@@ -153,9 +154,10 @@ print(f"honest error: {honest.rms:.2f} um RMS, {honest.verdict}")
 print(honest.reason.replace("; ", ";\n"))
 
 # %%
-# The model fitted to all cycles depends too much on single sensors: an undetected loss of one would cost more than the
-# drift. So it is unproven, and may run in shadow only. With a stronger ridge penalty the model depends less on each
-# sensor. Its error on unseen cycles is slightly larger, and it may run.
+# The model fitted to all cycles depends too much on single sensors: an undetected loss of one would cause a larger
+# error than the drift itself. So it is unproven, and may run in shadow only (its corrections are not applied). With a
+# stronger ridge penalty the model depends less on each sensor. Its error on unseen cycles is slightly larger, and it
+# may run.
 
 steady = DynamicRidge(strengths=(1e-3, 1e-2, 0.1, 1.0))
 model = study.fit(samples, steady, judging).models[0]
@@ -167,7 +169,7 @@ assert honest.verdict == "accepted"
 # 5. The model file
 # -----------------
 #
-# JSON with a checksum. Reading it restores the same numbers to the last bit.
+# The file is JSON with a checksum. Reading it restores the same numbers to the last bit.
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "model.json"
@@ -180,10 +182,10 @@ assert loaded == model
 # 6. One reading after the other
 # ------------------------------
 #
-# Another day, another job: a new random speed every 45 minutes. The model from the file corrects the machine. One
-# `~thermocomp.core.reading.Reading` goes in, one `~thermocomp.core.correction.Correction` comes out; the complete
-# memory is in ``state``. The correction has the opposite sign of the deviation; it is limited to 150 um and to a rate
-# of 0.05 um/s, which is 3 um per minute: faster than the drift.
+# On another day, with a new random speed every 45 minutes, the model from the file corrects the machine. Each step
+# turns one `~thermocomp.core.reading.Reading` into one `~thermocomp.core.correction.Correction`; the complete memory is
+# in ``state``. The correction has the opposite sign of the deviation; it is limited to 150 um and to a rate of 0.05
+# um/s, which is 3 um per minute: faster than the drift.
 
 workday = record("random")[0]
 names = [channel.name for channel in loaded.inputs]
@@ -197,9 +199,9 @@ state, result = compensator.step(state, reading, now=reading.time)
 print(reading.values["t_front_seat_C"], "degC:", result.corrections["z_um"])
 
 # %%
-# The first readings determine the zero, so the first correction is zero. Now continue. After seven hours the sensor at
-# the front bearing seat fails and reads NaN for half an hour, at a bad moment: the spindle has just started to run
-# faster.
+# The first readings determine the zero (the reference), so the first correction is zero. Now continue. After seven
+# hours the sensor at the front bearing seat fails and reads NaN for half an hour, at an unfavourable time: the spindle
+# has just started to run faster.
 
 corrections = [result.corrections["z_um"].offset]
 broken = []
@@ -214,7 +216,7 @@ for time, row in zip(workday.time[1:], values[1:], strict=True):
         broken.append(time / 3600)
 
 print(f"{reading.values['t_front_seat_C']} degC: correction {corrections[-1]:.1f} um at the end")
-print(f"from {broken[0]:.2f} to {broken[-1]:.2f} h not believed:", failed)
+print(f"from {broken[0]:.2f} to {broken[-1]:.2f} h rejected:", failed)
 print(held["z_um"])
 assert 7.1 < broken[0] < 7.2
 
@@ -245,18 +247,18 @@ axes[1].set_ylabel("z [um]")
 axes[1].set_xlabel("time [h]")
 for ax in axes:
     ax.margins(x=0)
-    ax.axvspan(broken[0], broken[-1], color="tab:red", alpha=0.15, label="sensor broken")
+    ax.axvspan(broken[0], broken[-1], color="tab:red", alpha=0.15, label="sensor failed")
 axes[1].legend(fontsize="small", loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=4)
 plt.show()
 
 # %%
-# Top: the spindle speed. Bottom: the drift, the correction, and their sum, which is the error of the part. The watch
-# found long before that the sensor of the y bearing deviates from its prediction, and replaced it by a substitute.
-# Without the front bearing seat as well, in the red interval, the correction is held, and the result gives the reason.
-# Meanwhile the machine continues to drift and the error grows. When the sensor is back, the correction returns at its
-# rate. A model with memory lacks the heating history of this interval, and needs some time until its prediction is
-# correct again.
+# Top: the spindle speed. Bottom: the drift, the correction, and their sum, which is the error of the part. The watch,
+# which compares each temperature with a prediction from the others, had found long before that the sensor of the y
+# bearing deviates from its prediction, and replaced its reading by the prediction. When the front bearing seat is lost
+# as well, in the red interval, the correction is held, and the result gives the reason. Meanwhile the machine continues
+# to drift and the error grows. When the sensor is back, the correction returns at its rate. Since the model has a
+# memory and lacks the temperatures of this interval, it needs some time until its prediction is correct again.
 #
-# Compare this residual with the honest error of step 4. The honest error is valid for days like those that were
+# Compare this residual with the error on unseen cycles of step 4. That error is valid for days like those that were
 # recorded; a job with a new speed every 45 minutes differs from six long cycles. If the two errors differ much, record
-# the actual operation of the machine.
+# the machine in its actual operation.

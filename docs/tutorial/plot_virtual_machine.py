@@ -2,9 +2,9 @@
 The virtual machine tool
 ========================
 
-The source of the recordings in the examples: a machining centre modelled by finite elements, reduced to about a hundred
-states that are computed in microseconds per step. This page runs it through the warm-up and cool-down of Chen, Yuan and
-Ni (six hours at one speed, ten hours at standstill) and evaluates the results as a metrologist would.
+The recordings in the examples come from a virtual machining centre: a finite-element model reduced to about a hundred
+states, which are computed in microseconds per step. This page runs it through the warm-up and cool-down of Chen, Yuan
+and Ni (six hours at one speed, ten hours at standstill) and evaluates the results as a metrologist would.
 """
 
 # %%
@@ -68,7 +68,7 @@ assert until(0.63, drift["tip"]) < 0.4 * until(0.63, temperature["column_front_r
 #
 # The same temperature of the housing corresponds to different drifts during warm-up and cool-down. No function of this
 # single temperature can predict the drift, however nonlinear: this is why the papers use several sensors, and why
-# `dynamic` also uses their past values.
+# the method `dynamic` also uses their past values.
 
 fig, axes = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 for ax, name in zip(axes, ("z", "y"), strict=True):
@@ -84,8 +84,8 @@ plt.show()
 # --------
 #
 # The displacement of the nut of a warm ball screw increases with the distance from the fixed bearing, and a bent column
-# pitches the headstock: the error of Y depends on Y. One slope describes most of it; this is Chen's observation, and
-# his reason to model a slope instead of a profile.
+# pitches the headstock: the error of Y depends on Y. One slope describes most of this; Chen observed the same, and
+# therefore modelled a slope instead of a profile.
 
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 positions = np.arange(0, 551, 50)
@@ -100,5 +100,5 @@ plt.show()
 warm = profiles[:, 6480] - profiles[0, 6480]
 slope, offset = np.polyfit(positions, warm, 1)
 bend = np.abs(warm - np.polyval([slope, offset], positions)).max()
-print(f"slope {1e3 * slope:.0f} um/m; off the straight line by at most {bend:.1f} um of {np.ptp(warm):.0f} um")
+print(f"slope {1e3 * slope:.0f} um/m; deviation from the straight line at most {bend:.1f} um of {np.ptp(warm):.0f} um")
 assert bend < 0.15 * np.ptp(warm)

@@ -5,9 +5,9 @@ A compensated work volume
 A drift test gives the error at one position. A part is machined anywhere on the table. In this example a laser with six
 degrees of freedom has measured all three axes of the virtual machining centre repeatedly while it worked, probes have
 measured the tool point at one position, and the squareness was measured by an artefact. From this data we fit all 18
-components of the axes, combine them anywhere in the work volume, and correct. The virtual machine knows its true error
-at every point, so we can judge quantities that are not accessible in a workshop. The same with files and commands:
-:doc:`../position`.
+components of the axes, combine them anywhere in the work volume, and correct. The true error of the virtual machine is
+known at every point, so we can evaluate quantities that are not accessible in a workshop. :doc:`../position` shows the
+same with files and commands.
 """
 
 # %%
@@ -51,11 +51,11 @@ assert len(codes) == 18
 # 2. From profiles to components
 # ------------------------------
 #
-# `~thermocomp.volumetric.models.positionoptions.fill_options` uses the profiles, never a temperature, to determine for
-# each component: how many powers of the position change with the temperatures (none, if the thermal part is only
-# noise), whether the profile shifts as a whole, and about which position it rotates. Then the cold profile is fitted,
-# and the slopes are fitted to the temperatures. These are absolute temperatures: a laser reads the actual state of the
-# machine on that morning, which differs from day to day.
+# From the profiles, without using the temperatures, `~thermocomp.volumetric.models.positionoptions.fill_options`
+# determines for each component how many powers of the position change with the thermal state (none, if the thermal part
+# is only noise), whether the profile shifts as a whole, and about which position it rotates. Then the cold profile is
+# fitted, and the slopes are fitted to the temperatures. These are absolute temperatures: a laser reads the actual state
+# of the machine on that morning, which differs from day to day.
 
 fits = {}
 for code in codes:
@@ -73,15 +73,15 @@ for code, fit in fits.items():
 assert fits["EXX"].model.reference_position == 300.0
 
 # %%
-# The last column is the remainder of the thermal part after these powers: the laser's noise, and for a long screw a
+# The last column is the residual of the thermal part after these powers: noise of the laser and, for a long screw, a
 # curvature.
 #
 # 3. The machine
 # --------------
 #
-# At the position of the tool during the measurements by lasers and nest, the angular errors have no lever and the
-# profiles are zero. So the nest measures all drifts at that position, of spindle and axes together, and nothing is
-# counted twice.
+# At the position at which the lasers were set to zero and the nest of probes was mounted, the angular errors have no
+# lever and the profiles are zero. So the nest measures the whole drift at that position, of spindle and axes together,
+# and nothing is counted twice.
 
 PLACE, BAR = (300.0, 250.0, 300.0), (0.0, 0.0, -150.0)
 TRAVEL = {"X": 600.0, "Y": 550.0, "Z": 600.0}
@@ -101,8 +101,8 @@ model = VolumetricModel(machine)
 print(len(components), "of 32 components,", len(model.inputs), "inputs")
 
 # %%
-# 4. A day that nobody has learned from
-# -------------------------------------
+# 4. A day that was not used for training
+# ---------------------------------------
 #
 # A day with different weather, speeds and feed rates. The model is replayed over it, reading by reading, from
 # temperatures and speed alone.
@@ -134,12 +134,13 @@ panels[0, 0].legend()
 plt.show()
 
 # %%
-# 5. Judged by the truth
-# ----------------------
+# 5. Comparison with the true error
+# ---------------------------------
 #
-# 1,000 random points, each at a random instant of that day. The true error is computed by `~thermocomp.virtual.volume`
-# from the structure of the machine, independently of our model. It is relative to the zero that was set at the test
-# position at the beginning of the day; the correction is added to the commanded positions of the axes.
+# The comparison uses 1,000 random points, each at a random instant of that day. The true error is computed by
+# `~thermocomp.virtual.volume` from the structure of the machine, independently of our model. It is relative to the zero
+# that was set at the test position at the beginning of the day; the correction is added to the commanded positions of
+# the axes.
 
 truth = VolumetricTruth(MachiningCentre().observables)
 zero = truth.error(day.observables[:1], [PLACE])
@@ -168,17 +169,16 @@ for k, axis in enumerate("XYZ"):
 assert rms(before) > 8 * rms(after)
 
 # %%
-# Most of the residual has a single cause. At the test position, where all profiles are zero, the error of the drift
-# predicted from the temperatures is almost as large as the error anywhere; when this is subtracted, the contribution of
-# the axes remains.
+# Most of the residual has a single cause. At the test position, where all profiles are zero, the error of the predicted
+# drift is almost as large as the error anywhere else; if it is subtracted, the contribution of the axes remains.
 
 there = left(instants, np.tile(PLACE, (len(points), 1)))
-print(f"left at the test position {rms(there):.1f} um (Z alone {rms(there[:, [2]]):.1f} um)")
-print(f"left besides {rms(after - there):.1f} um")
+print(f"residual at the test position {rms(there):.1f} um (Z alone {rms(there[:, [2]]):.1f} um)")
+print(f"residual without that of the test position {rms(after - there):.1f} um")
 assert rms(after - there) < rms(there)
 
 # %%
-# So a better laser would improve little here. Probing a sphere occasionally would improve much.
+# So a better laser would improve the result only a little, whereas probing a sphere occasionally would improve it much.
 
 fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
 for name, error, color in (("without compensation", before, "0.3"), ("compensated", after, "tab:green")):
@@ -186,7 +186,7 @@ for name, error, color in (("without compensation", before, "0.3"), ("compensate
     share = np.linspace(0, 100, len(size))
     ax.plot(size, share, color=color, label=f"{name}: 95 % below {np.percentile(size, 95):.1f} um")
 ax.set_xlabel("length of the error vector [um]")
-ax.set_ylabel("points with a smaller one [%]")
+ax.set_ylabel("points with a smaller error [%]")
 ax.set_xlim(left=0)
 ax.set_ylim(0, 100)
 ax.legend(loc="lower right")
@@ -222,5 +222,5 @@ plt.show()
 
 # %%
 # This is a virtual machine: its sensors are close to the heat sources, and its laser reads every five minutes for eight
-# days. On a real machine, judge as ``thermocomp position`` and ``thermocomp fit`` do, on days that were left out, and
-# then on a test piece.
+# days. On a real machine, evaluate the models as ``thermocomp position`` and ``thermocomp fit`` do, on days that were
+# left out, and then on a test piece.

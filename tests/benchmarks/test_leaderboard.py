@@ -96,11 +96,11 @@ def test_the_rest_is_judged_and_what_failed_is_named(board: tuple[dict[str, Any]
 
 
 def test_a_test_without_its_data_is_skipped_and_says_so(copied: Path, board: tuple[dict[str, Any], str]) -> None:
-    assert "is not here; set THERMOCOMP_DATA" in board[0]["tests"]["voron"]["skipped"]
+    assert "is missing; set THERMOCOMP_DATA" in board[0]["tests"]["voron"]["skipped"]
     assert "skipped: " in board[1]
     done = run(copied, "--tests", "voron,fl-thermal")
     assert done.returncode == 2
-    assert "nothing to judge on" in done.stderr
+    assert "no test can be run" in done.stderr
 
 
 def test_twice_the_same(copied: Path, board: tuple[dict[str, Any], str]) -> None:

@@ -1,8 +1,8 @@
-"""Boosted trees: what the publishers of fl_thermal tried, in scikit-learn's form."""
+"""Boosted trees, as tried by the publishers of fl_thermal, in scikit-learn's implementation."""
 
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-SUMMARY = "scikit-learn's boosted trees on the temperatures of the moment, its own settings"
+SUMMARY = "scikit-learn's boosted trees on the present temperatures, with default settings"
 
 
 def estimator() -> HistGradientBoostingRegressor:
