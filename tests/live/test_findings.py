@@ -93,7 +93,7 @@ def test_what_is_good_passes_and_nothing_is_written(tmp_path: Path) -> None:
                 ("#/", "put it at the end"),
                 ("", "name a topic"),
                 ("  ", "name a topic"),
-                ("a\\u0000b", "cannot be printed"),
+                ("a\\u0000b", "non-printable characters"),
                 ("$share/g", "$share/GROUP/TOPIC"),
                 ("$share/+/t", "$share/GROUP/TOPIC"),
                 ("é" * 40_000, "longer than 65,535 bytes"),

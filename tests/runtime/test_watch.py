@@ -347,8 +347,8 @@ def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Sample
         ({"off": math.nan}, "off"),
         ({"jump": 0.0}, "jump"),
         ({"still": -1.0}, "still"),
-        ({"weights": (1.0,)}, "weights per sensor"),
-        ({"input": 3}, "one sensor per temperature"),
+        ({"weights": (1.0,)}, "has 1 weights; expected"),
+        ({"input": 3}, "expected one per temperature"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(watch: Watch, change: dict[str, Any], says: str) -> None:

@@ -39,7 +39,9 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
     if any(m.watch != watch for m in models):
-        raise ModelFileError("model file: its models have different watches; write them to separate files")
+        raise ModelFileError(
+            "model file: its models have different watches (sensor monitoring); write them to separate files"
+        )
     shared = None if watch is None else {"watch": asdict(watch)}
     return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models], shared)
 

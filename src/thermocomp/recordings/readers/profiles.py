@@ -149,7 +149,7 @@ def _read_place(value: Any, where: str) -> Place:
         try:
             position = read_with_unit(text, "position")
         except UnitError as e:
-            raise UnitError(f"{where}.{axis}: {e}") from e
+            raise UnitError(f"{where}.{axis} = {text!r}: {e}") from e
         if position is None:
             raise InputError(f'{where}.{axis} = {text!r}: write a position with its unit, such as "250 mm"')
         place[axis.upper()] = position
