@@ -226,9 +226,21 @@ def test_events_are_not_drowned(tmp_path: Path) -> None:
     ("old", "new", "says"),
     [
         ('topic = "m"', 'topic = "m\\u0007"', "sources.1.topic: 'm\\x07' contains non-printable characters"),
-        ('topic = "m"', 'topic = "m"\nnames = {"a\\u202E" = "t"}', "sources.1.names: 'a\\u202e' contains non-printable characters"),
-        ('topic = "m"', 'topic = "m"\nnames = {a = "t\\n"}', "sources.1.names.a: 't\\n' contains non-printable characters"),
-        ('topic = "m"', 'topic = "m"\nhost = "a\\u0000b"', "sources.1.host: 'a\\x00b' contains non-printable characters"),
+        (
+            'topic = "m"',
+            'topic = "m"\nnames = {"a\\u202E" = "t"}',
+            "sources.1.names: 'a\\u202e' contains non-printable characters",
+        ),
+        (
+            'topic = "m"',
+            'topic = "m"\nnames = {a = "t\\n"}',
+            "sources.1.names.a: 't\\n' contains non-printable characters",
+        ),
+        (
+            'topic = "m"',
+            'topic = "m"\nhost = "a\\u0000b"',
+            "sources.1.host: 'a\\x00b' contains non-printable characters",
+        ),
         ("[[sources]]", f'state = "{"s" * 70_000}"\n[[sources]]', "characters; at most 65,535"),
     ],
 )

@@ -34,7 +34,7 @@ GOOD = "time_s,t1_C,drift_um\n0,20.5,0\n15,20.6,1\n"
         ("time_s;t1_C\n0;20,5\n5;20,4\n15;20.5\n", ["line 4", "'t1_C'", "'20.5'"]),
         ("time_s;t1_C\n0;20\n15;warm\n", ["line 3", "'t1_C'", "'warm'"]),
         ("time_s,t1_C\n0,20\nlater,21\n", ["line 3", "'time_s'", "'later'"]),
-        ("time_s,t1_C\n0,20\n15,21\n15,22\n15,22\n", ["line 4", "15.0 comes twice", "line 3", "2 rows"]),
+        ("time_s,t1_C\n0,20\n15,21\n15,22\n15,22\n", ["line 4", "15.0 occurs twice", "line 3", "2 rows"]),
         ("time_s,t1_C\n0,20\n\n15,21\n14,22\n", ["line 5", "14.0 is before 15.0", "line 4", "split the file"]),
         ("time_s,t1_C\n0,20\n,21\n", ["line 3", "'time_s'", "time is missing"]),
         ("time,t1_C\n2024-01-01T00:00:00,20\n2023-12-31T00:00:00,21\n", ["line 3", "2023-12-31", "is before"]),
@@ -249,7 +249,7 @@ def test_a_damaged_description_of_its_own_is_noted(tmp_path: Path) -> None:
         ([], ["is empty"]),
         ([["time_s", "t1_C"]], ["no rows below"]),
         ([["time_s", "t1_C"], [0, 20], [15, "warm"]], ["row 3", "'t1_C'", "'warm'"]),
-        ([["# remark", None], ["time_s", "t1_C"], [0, 20], [0, 21]], ["row 4", "0.0 comes twice", "row 3"]),
+        ([["# remark", None], ["time_s", "t1_C"], [0, 20], [0, 21]], ["row 4", "0.0 occurs twice", "row 3"]),
     ],
 )
 def test_a_bad_sheet_is_told_with_its_row(tmp_path: Path, rows: list[list[object]], parts: list[str]) -> None:

@@ -43,7 +43,7 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
     psi = maximal_correlations(sets, subsets, half_window=HALF_WINDOW, jobs=jobs, share=share, progress=progress)
     done = np.isfinite(psi.psi).all(axis=(0, 1))
     if not done.any():
-        raise FitError("stopped before the first thermal cycle was completed")
+        raise FitError("the calculation was stopped before the first thermal cycle was completed")
     same = equivalents(list(psi.psi[:, :, done]), psi.subsets, level=settings.level, holm=settings.holm)
 
     total = dict(zip(same.subsets, same.summed.sum(axis=0).tolist(), strict=True))

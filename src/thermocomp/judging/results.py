@@ -210,7 +210,8 @@ class Assessment:
         if self.caveat or not self.learned:
             return told
         return (
-            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training: left out"
+            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training and are "
+            "left out"
         )
 
 

@@ -99,7 +99,7 @@ class LearningCurve:
         slope = f"each of the last cycles reduced the error by {self.last_gain:.2f} um"
         if last.rms >= self.none:
             return (
-                f"{of}, {self.none:.2f} without compensation: the model has learned nothing that applies to unseen "
+                f"{of}, {self.none:.2f} without compensation: the model is no better than no compensation on unseen "
                 "cycles"
             )
         if self.enough:

@@ -26,7 +26,8 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
     ending = path.suffix.lower()
     if ending not in _OPEN:
         raise RecordingError(
-            f"{path}: files ending in {ending or 'nothing'!r} cannot be read; save it as one of {', '.join(_OPEN)}"
+            f"{path}: files with the extension {ending or 'none'!r} cannot be read; save it as one of "
+            f"{', '.join(_OPEN)}"
         )
     try:
         check_file(path, mapping.limits)

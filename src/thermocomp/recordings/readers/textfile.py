@@ -125,7 +125,7 @@ class CsvTable(FileTable):
             ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
         except IndexError as e:  # the file ends within a cell
-            raise ValueError("it contains no rows") from e
+            raise ValueError("the file contains no rows") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
                 f"{self.path}: is not written in {self.encoding} ({e.reason}); specify the correct encoding in a "
