@@ -383,5 +383,5 @@ def test_a_mistake_in_the_graph_is_found(tmp_path: Path, was: float, becomes: fl
 
 def test_models_that_average_their_zero_in_different_ways() -> None:
     models = [growing("x_um", 1.0), replace(growing("y_um", 1.0), zeroing=Zeroing(60.0, 20.0))]
-    with pytest.raises(InputError, match="export each file separately"):
+    with pytest.raises(InputError, match="export each model file separately"):
         write_package(Compensator.of(models), "mill", FACTS)

@@ -89,7 +89,10 @@ controller must not compensate for temperature itself at the same time.
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
     """Return all files by name."""
     if len({m.zeroing for m in compensator.models}) > 1:
-        raise InputError("the models average their zero in different ways: export each file separately")
+        raise InputError(
+            "the models have different averaging times of the zero (reference reading): export each model file "
+            "separately"
+        )
     inside, name = without_watch(compensator), identifier(name)
     said = [*facts.lines(compensator), NOT_INSIDE]
     tables = gather(inside)

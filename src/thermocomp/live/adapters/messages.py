@@ -65,7 +65,7 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
         raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
         raise ReadingError(
-            f"a measurement with a number beyond {_FAR:g} um or mm, or a repeatability below 0; check the units"
+            f"a measurement with a number beyond {_FAR:g} um or mm, or with a negative repeatability; check the units"
         )
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)

@@ -30,7 +30,7 @@ class SavedJob:
 def dumps(state: JobState, written: datetime) -> str:
     """Return the text of a state file, with floats that are restored to the last bit when read."""
     if written.tzinfo is None:
-        raise InputError(f"state of a job: {written} has no time zone")
+        raise InputError(f"state of a job: time of writing {written} has no time zone")
     entry = {"written": written.astimezone(UTC).isoformat(), "state": asdict(state)}
     return jsonfile.pack(KIND, [entry])
 

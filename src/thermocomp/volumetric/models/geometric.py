@@ -159,7 +159,10 @@ def fit_profile(
     columns = taken.columns(chosen)
     n_terms = columns.shape[1]
     if np.linalg.matrix_rank(columns) < n_terms:
-        raise FitError(f"profile along {axis}: {len(np.unique(place))} points do not determine {n_terms} terms")
+        raise FitError(
+            f"profile along {axis}: {len(np.unique(place))} different points do not determine {n_terms} terms; "
+            "choose a lower order"
+        )
     found: FloatArray = np.asarray(np.linalg.lstsq(columns, values)[0], dtype=np.float64)
     left = values - columns @ found
     spare = len(values) - n_terms

@@ -199,7 +199,7 @@ class LinuxCncSink:
         except (OSError, TimeoutError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as e:
             raise self._fail(str(e) or "no answer") from e
         except (RecursionError, ThermocompError) as e:
-            raise self._fail(f"unexpected answer: {e}") from e
+            raise self._fail(f"the answer of LinuxCNC is not as expected: {e}") from e
         finally:  # also if cancelled: a late answer would be taken as the reply to the next message
             if not heard:
                 await self._hang_up()

@@ -107,7 +107,9 @@ class OriginWriter:
 
     def refuse(self, reason: str, file: str = "") -> ProgramError:
         """Return an error for the line being run; in a subprogram in another file, for the last line of the program."""
-        return ProgramError(max(self.line, 1), f"it cannot be expanded: {reason}" + (f" (in {file})" if file else ""))
+        return ProgramError(
+            max(self.line, 1), f"cannot be written as plain lines: {reason}" + (f" (in {file})" if file else "")
+        )
 
     def chosen_system(
         self, a: Canonical, b: Canonical, angles: tuple[float, float] | None, source: str
@@ -159,8 +161,8 @@ class OriginWriter:
         text = _bare(source)
         if not PLAIN_G10.fullmatch(text):
             raise self.refuse(
-                "the origin of a work coordinate system that is not in force is set by more than plain numbers; select "
-                "that system before (G54 ...), or write the numbers"
+                "the origin of a work coordinate system that is not in force is set by expressions; select that "
+                "system before (G54 ...), or write plain numbers"
             )
         index = int(text[text.index("P") + 1])
         for letter, value in re.findall(r"([XYZABC])([-+]?[\d.]+)", text):
