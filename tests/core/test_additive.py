@@ -137,7 +137,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: st
     ("name", "weights", "message"),
     [
         ("a", ((0, float("inf")),), "variable a: weights must be finite"),
-        ("none", (), "variable none: has no input"),
+        ("none", (), "variable none has no input"),
         ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a valid name"),
     ],
 )

@@ -343,7 +343,7 @@ def test_refusals() -> None:
     only_heat = recorded({"t_C": np.ones(30)})
     with pytest.raises(InputError, match="no displacement"):
         assess(only_heat)
-    with pytest.raises(InputError, match="has one row"):
+    with pytest.raises(InputError, match="has only one row"):
         assess(recorded({"z_um": np.ones(1)}))
     with pytest.raises(InputError, match="the ambient channel is a temperature"):
         assess(spindle_test(), ambient="z_um")

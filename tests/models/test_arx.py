@@ -238,7 +238,7 @@ def test_no_spindle_speed() -> None:
         ({"k": -1}, "order k: -1"),
         ({"m_max": -1}, "order m: -1"),
         ({"criterion": "r2"}, "criterion 'r2'"),
-        ({"inputs": ["rpm"]}, "input 'rpm': the columns are x0"),
+        ({"inputs": ["rpm"]}, "input 'rpm': no such column; the columns are x0"),
         ({"inputs": [0, 0]}, "given twice"),
         ({"inputs": [3]}, "beyond the 1 columns"),
     ],

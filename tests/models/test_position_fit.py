@@ -94,7 +94,7 @@ def test_a_profile_of_two_coordinates() -> None:
     assert alone.order[1] == 0
     assert off(alone.profile.at(points), truth(points)) > 0.7
     assert off(found.profile.at(points), truth(points)) < 0.1
-    with pytest.raises(InputError, match="a spline depends on Y only: for the coordinates YX choose a polynomial"):
+    with pytest.raises(InputError, match="a spline depends on Y only; choose a polynomial for the coordinates YX"):
         fit_profile(points, values, "Y", kind="spline", coordinates="YX")
 
 

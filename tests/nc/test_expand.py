@@ -193,7 +193,7 @@ def test_what_the_program_does_not_say_can_be_told(plain: Plain) -> None:
     ]  # fmt: skip
     corner = "G21\nG0 X0 Y0\nT1 M6\nG41\nG1 X10 F100\nX20\nY20\nG40 X30\nM2\n"
     assert "G1 X18 Y2" in plain(corner, diameters={1: 4.0})
-    with pytest.raises(ProgramError, match="line 5: cannot be written as plain lines"):
+    with pytest.raises(ProgramError, match="line 5: the program cannot be written as plain lines"):
         plain(corner, diameters={2: 4.0})
     assert plain("G21\n/G0 X1\nG0 X2\nM2\n", block_delete=True) == [START, "G21", "G0 X2", "M2"]
 

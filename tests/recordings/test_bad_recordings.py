@@ -97,7 +97,7 @@ def test_a_binary_file_named_csv_is_told_as_what_it_is(tmp_path: Path, content: 
     path = tmp_path / "bad.csv"
     path.write_bytes(content)
 
-    with pytest.raises(RecordingError, match=rf"bad\.csv: is .*{says}"):
+    with pytest.raises(RecordingError, match=rf"bad\.csv: the file is .*{says}"):
         read(path)
 
 
@@ -106,7 +106,7 @@ def test_a_damaged_workbook_or_parquet_file_is_told(tmp_path: Path, ending: str)
     path = tmp_path / f"bad.{ending}"
     path.write_text(GOOD)
 
-    with pytest.raises(RecordingError, match=rf"bad\.{ending}: is not a"):
+    with pytest.raises(RecordingError, match=rf"bad\.{ending}: this is not a"):
         read(path)
 
 
@@ -122,13 +122,13 @@ def test_a_missing_file_is_told_with_the_nearest_name(tmp_path: Path) -> None:
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
 
-    with pytest.raises(RecordingError, match=r"folder\.csv: cannot be read: Is a directory"):
+    with pytest.raises(RecordingError, match=r"folder\.csv: the file cannot be read: Is a directory"):
         read(tmp_path / "folder.csv")
 
 
 def test_a_pipe_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(RecordingError, match=r"pipe\.csv: is a pipe or a device, not a file"):
+    with pytest.raises(RecordingError, match=r"pipe\.csv: this is a pipe or a device, not a file"):
         read(tmp_path / "pipe.csv")
 
 
@@ -232,7 +232,7 @@ def test_a_wrong_encoding_is_told(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"bad\.csv: the heading line is not written in utf-8"):
         read(path, Mapping(read=ReadOptions(encoding="utf-8")))
     path.write_bytes("time_s,t1_C,cycle\n0,20,früh\n".encode("latin-1"))
-    with pytest.raises(RecordingError, match=r"bad\.csv: is not written in utf-8"):
+    with pytest.raises(RecordingError, match=r"bad\.csv: the file is not written in utf-8"):
         read(path, Mapping(read=ReadOptions(encoding="utf-8")))
 
 

@@ -197,7 +197,7 @@ def test_the_command_and_python_write_the_same_page(
     first = Path("report.html").read_bytes()
     assert b"<h2>Sensors</h2>" in first
     assert run([*words, "-o", "report.html"]) == 2
-    assert "report.html: exists already" in " ".join(capsys.readouterr().err.split())
+    assert "report.html: the file exists already" in " ".join(capsys.readouterr().err.split())
     assert run([*words, "-o", "model.html"]) in (0, 1)
     assert run([*words, "-o", "failing.csv", "--overwrite"]) == 2
     assert "is also an input" in " ".join(capsys.readouterr().err.split())

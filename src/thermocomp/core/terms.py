@@ -46,7 +46,7 @@ class Variable:
         check_count(f"variable {self.name}", INPUTS, weights=self.weights)
         check_finite(f"variable {self.name}", weights=[w for _, w in self.weights])
         if not self.weights:
-            raise SettingError(f"variable {self.name}: has no input")
+            raise SettingError(f"variable {self.name} has no input")
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":

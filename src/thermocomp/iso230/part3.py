@@ -104,7 +104,7 @@ def assess(
             + (f" ({_stations_words(stations)})" if stations else "")
         )
     if len(recording) < 2:
-        raise InputError(f"{recording.name}: has one row; a thermal test needs at least two rows")
+        raise InputError(f"{recording.name}: the recording has only one row; a thermal test needs at least two")
     air = recording.channel(ambient) if ambient is not None else recording.ambient
     if air is not None and air.quantity != "temperature":
         raise InputError(f"{recording.name}: {air.name} is a {air.quantity}; the ambient channel is a temperature")

@@ -42,9 +42,7 @@ class Rules:
     def check(self, names: Sequence[str]) -> None:
         """Raise `InputError` if the primary method is not among those compared."""
         if self.primary is not None and self.primary not in names:
-            raise InputError(
-                f"primary method {self.primary!r} is not among the compared methods; compared are {', '.join(names)}"
-            )
+            raise InputError(f"primary method {self.primary!r} is not among the compared methods, {', '.join(names)}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,8 @@ class Fleet:
         model = self.model
         if not isinstance(model, LinearDynamic) or model.support.policy != "clip" or model.unit != "um":
             raise InputError(
-                f"model of {model.target}: a fleet supports only linear models with lags, in um, that clip their inputs"
+                f"model of {model.target}: a fleet supports only linear models with lags that predict um and clip "
+                "their inputs"
             )
         if any(len(signal) != 1 for signal in model.signals):
             raise InputError(f"model of {model.target}: a fleet does not support models with products of inputs")

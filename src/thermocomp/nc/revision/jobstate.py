@@ -39,7 +39,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     """Read the text of a state file."""
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
-        raise ModelFileError(f"{source}: contains the states of {len(jobs)} jobs; expected one")
+        raise ModelFileError(f"{source}: the file contains the states of {len(jobs)} jobs; expected one")
     saved = jobs[0]
     return SavedJob(saved.written.astimezone(UTC), saved.state)
 

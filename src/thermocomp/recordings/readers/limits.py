@@ -108,5 +108,5 @@ def check_file(path: Path, limits: FileLimits) -> None:
     """Reject a path that is not a regular file, such as a pipe or a device (also through a link), or a large file."""
     found = path.stat()
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder raises a clear error
-        raise RecordingError(f"{path}: is a pipe or a device, not a file; save its output to a file")
+        raise RecordingError(f"{path}: this is a pipe or a device, not a file; save its output to a file")
     limits.check("file_bytes", found.st_size, path)

@@ -189,7 +189,7 @@ def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) 
         raise InputError(f"coordinates {used!r}: name the axis {axis} itself and, if required, others of X, Y, Z")
     others = "".join(a for a in used if a != axis and a in varying)
     if kind == "spline" and others and coordinates is not None:
-        raise InputError(f"a spline depends on {axis} only: for the coordinates {used} choose a polynomial")
+        raise InputError(f"a spline depends on {axis} only; choose a polynomial for the coordinates {used}")
     n_own = len(np.unique(points[:, "XYZ".index(axis)]))
     if n_own < MIN_POSITIONS:
         raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")

@@ -145,7 +145,9 @@ def expand(
                     acts = compare(asked, done)
                 compare_parameters(*left)
             except ProgramError as error:
-                raise ProgramError(error.line, f"cannot be written as plain lines: {error.reason}") from error
+                raise ProgramError(
+                    error.line, f"the program cannot be written as plain lines: {error.reason}"
+                ) from error
     return Expansion(out, sources, acts)
 
 
@@ -209,7 +211,7 @@ def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) 
     for code, reason in reasons.items():
         for number in _lines_with(code, file, block_delete):
             where = "" if own else f" (line {number} of {file.name})"
-            raise ProgramError(number if own else 1, f"cannot be written as plain lines: {reason}{where}")
+            raise ProgramError(number if own else 1, f"the program cannot be written as plain lines: {reason}{where}")
 
 
 def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterator[int]:

@@ -108,7 +108,8 @@ class OriginWriter:
     def refuse(self, reason: str, file: str = "") -> ProgramError:
         """Return an error for the line being run; in a subprogram in another file, for the last line of the program."""
         return ProgramError(
-            max(self.line, 1), f"cannot be written as plain lines: {reason}" + (f" (in {file})" if file else "")
+            max(self.line, 1),
+            f"the program cannot be written as plain lines: {reason}" + (f" (in {file})" if file else ""),
         )
 
     def chosen_system(
