@@ -173,7 +173,7 @@ def faults(path: Path) -> list[str]:
         ('file = "out.json"', 'file = "."', "is a folder"),
         ('file = "day.csv"', 'file = "token.txt"', "token.txt: the file has no column time_s"),
         ('file = "day.csv"', 'file = "broken.csv"', "broken.csv: line 3 cannot be read"),
-        ('token_file = "token.txt"', 'token_file = "short.txt"', "short.txt: a token of 5 characters"),
+        ('token_file = "token.txt"', 'token_file = "short.txt"', "short.txt: the token has only 5 characters"),
         ('token_file = "token.txt"', 'token_file = "missing.txt"', "missing.txt: no such file"),
         ("port = 0", 'host = "203.0.113.7"', "page on 203.0.113.7"),
         ("port = 0", 'host = "nowhere.invalid"', "page on nowhere.invalid"),

@@ -63,7 +63,8 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
     if any(m.watch is not None for m in found.models):
         raise ModelFileError(
-            f"{source}: a watch is stored inside a model; it must be stored once in the file, next to the models"
+            f"{source}: a watch (sensor monitoring) is stored inside a model; it must be stored once in the file, "
+            "next to the models"
         )
     models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
     _check_judged(models, source)

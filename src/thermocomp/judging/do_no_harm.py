@@ -30,7 +30,7 @@ LEVEL = 0.05
 #: baselines for comparison
 BASELINES = ("no compensation", "the learned mean", "the last learned value")
 #: fourth baseline for a single continuous block: without model, both relative to the mean of the block's first rows
-NAMES = (*BASELINES, "none, both re-zeroed at the start of the block")
+NAMES = (*BASELINES, "no compensation, both re-zeroed at the start of the block")
 REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}

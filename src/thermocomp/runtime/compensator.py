@@ -297,7 +297,7 @@ class Compensator:
                 done.states[target] = Status("restarting", "its zero is being averaged")
                 continue
             if target not in done.references:
-                done.references[target] = Reference(times[0], "start: mean over the first readings")
+                done.references[target] = Reference(times[0], "mean over the first readings after the start")
             zero, probing = done.references[target].shift, fresh.get(target)
             known, most = done.learned.get(target), self.limits.magnitude
             answer = evaluate(line, self.models, stepped, times[1], known, probing, failed, zero, most)

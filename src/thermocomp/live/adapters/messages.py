@@ -96,7 +96,7 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     try:
         content = parse_json(payload)
     except ValueError as e:
-        raise ReadingError(f"a message that is not JSON: {escape(e, 80)}") from e
+        raise ReadingError(f"a message that is not JSON: {escape(e, 80)}; expected {example}") from e
     if not isinstance(content, dict):
         raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; expected {example}")
     for name, value in content.items():

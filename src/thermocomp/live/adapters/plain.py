@@ -61,7 +61,7 @@ class Played:
     async def readings(self) -> AsyncIterator[Reading]:
         """Return rows when they are due, up to the last one."""
         if self._rows is None:
-            raise ThermocompError("not connected")
+            raise ThermocompError("the recording is not open: connect first")
         while (row := self._next()) is not None:
             at, values = row
             if math.isnan(self._begun):

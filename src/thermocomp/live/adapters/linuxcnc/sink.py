@@ -180,7 +180,7 @@ class LinuxCncSink:
     async def _hear(self, line: bytes) -> None:
         """Send a line and process the answer; close the connection unless the answer matches."""
         if self._streams is None:
-            raise self._fail("not connected")
+            raise self._fail("the service is not connected to LinuxCNC")
         reader, writer = self._streams
         heard = False
         try:

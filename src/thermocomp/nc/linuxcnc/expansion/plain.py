@@ -76,7 +76,7 @@ class Writer(OriginWriter):
             self.line = line if first.file or second.file else min(line, second.line)
             raise self.refuse(
                 f"the path of execution {DEPENDS}: a branch or a loop uses a parameter, an origin or a position that "
-                "the program has not set; set it first",
+                "the program has not set; set it in the program first",
                 first.file,
             )
         merged = False
