@@ -265,7 +265,7 @@ class Verdict:
     def _pooled(self, k: int) -> str:
         pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
         mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
-        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all units"
+        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
 
 
 def measure(

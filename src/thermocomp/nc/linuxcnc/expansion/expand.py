@@ -173,7 +173,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
             if first is None or second is None:
-                raise writer.refuse(f"its end position {DEPENDS}")
+                raise writer.refuse(f"the end position of the program {DEPENDS}; set it in the program first")
             if first.kind == "end" and not first.file and _REPEATS.search(_code(writer.source(first.line))):
                 raise ProgramError(first.line, "M99 in a main program repeats it endlessly: end it with M2 or M30")
             yield from writer.write(first, second)
