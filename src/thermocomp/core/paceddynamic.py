@@ -112,12 +112,11 @@ class PacedDynamic(ErrorModel):
                 f"{owner}: lagged coefficients of input {wrong[0].input}: expected {len(self.time_constants)}, one per "
                 f"lag; found {len(wrong[0].lagged)}"
             )
-        for what, parts_of_kind in (("temperature", temperatures), ("speed state", states)):
-            for k, part in enumerate(parts_of_kind):
-                if not 0 <= part.input < len(self.inputs):
-                    raise SettingError(
-                        f"{owner}: {what} {k}: input index {part.input}: expected 0 to {len(self.inputs) - 1}"
-                    )
+        named = [(f"temperature {k}", t.input) for k, t in enumerate(temperatures)]
+        named += [(f"speed state {k}", s.input) for k, s in enumerate(states)]
+        for what, index in named:
+            if not 0 <= index < len(self.inputs):
+                raise SettingError(f"{owner}: {what}: input index {index}: expected 0 to {len(self.inputs) - 1}")
         slower = [s for s in states if s.running > s.stopped]
         if slower:
             raise SettingError(
