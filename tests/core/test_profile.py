@@ -112,7 +112,7 @@ def test_a_constant_has_the_shape_of_the_points(exponents: tuple[tuple[int, int,
         ({"exponents": ((0, 0, 0), (0, -1, 0))}, "expected three from 0 to 30"),
         ({"exponents": ((0, 0, 0), (0, 1))}, "expected three from 0"),
         ({"scale": (1.0, 0.0, 1.0)}, "scale must be from 1e-06"),
-        ({"low": (0.0, 2.0, 0.0)}, "is empty"),
+        ({"low": (0.0, 2.0, 0.0)}, "the lower end must not exceed the upper end"),
         ({"high": (0.0, np.nan, 0.0)}, "high must be finite"),
     ],
 )

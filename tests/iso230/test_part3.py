@@ -327,7 +327,7 @@ def test_detection_and_ambient() -> None:
 def test_what_falls_short_is_said() -> None:
     (test,) = assess(recorded({"z_um": np.arange(30.0), "s_rpm": np.full(30, 100.0)}), "etve")
     notes = " | ".join(test.notes)
-    assert "the test ran for 29 min only" in notes
+    assert "the test ran for only 29 min" in notes
     assert "the spindle or an axis moves" in notes
     assert "the test is 0.5 h long" in notes
     assert "no ambient temperature was identified" in notes

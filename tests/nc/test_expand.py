@@ -170,7 +170,7 @@ def test_plain_lines(plain: Plain, text: str, lines: list[str]) -> None:
         ("G21\nG0 X0 Y0\nT1 M6\nG41\nG1 X10 F100\nX20\nM2\n", 5, "depends on what is stored"),
         ("G21\nG0 Z5\nG98 G81 X1 Y1 Z-1 R1 F100\nM2\n", 3, "restores the path mode"),
         ("G21 G64\nG0 Z5\nG81 X1 Y1 Z-1 R1 F100\nM2\n", 3, "G98 or G99"),
-        ("G21\n(DEBUG,#5221)\nM2\n", 2, "this message depends"),
+        ("G21\n(DEBUG,#5221)\nM2\n", 2, "the values in this message depend"),
         ("G21\n\nG1 X1\nM2\n", 3, "zero feed"),
         ("G21 F100\nG43 H1\nG43.2 H2\nM2\n", 3, "tool length in force depends"),
         ("G21 F100\nG0 X0 Y0\nG5.2 P1\nX5 Y5 P1\nX9 Y0 P2\nG5.3\nM2\n", 6, "splines"),

@@ -225,4 +225,4 @@ def _cubic(c: Sequence[float] | FloatArray, u: Numbers) -> Numbers:
 
 def _check_range(low: Vector, high: Vector) -> None:
     if not all(a <= b for a, b in zip(low, high, strict=True)):
-        raise SettingError(f"profile: range from {low} to {high} mm: the first value must be below the second")
+        raise SettingError(f"profile: range from {low} to {high} mm: the lower end must not exceed the upper end")
