@@ -139,7 +139,7 @@ def test_the_verdict_is_that_of_the_command(recording: Recording) -> None:
 
 def test_nothing_is_accepted_that_was_not_tried_with_noise(recording: Recording) -> None:
     found = tc.compare(recording, "z_um", "ols", robustness=False)
-    untried = "noise and lost sensors were not tried: compare with robustness=True"
+    untried = "the effects of noise and of a lost sensor were not tested: compare with robustness=True"
     assert found.to_frame()[["verdict", "reason"]].to_numpy().tolist() == [["unproven", untried]]
     assert found.best == {"z_um": None}
     assert str(found) == f"No model may run yet for z_um: {untried}."
@@ -216,7 +216,7 @@ def test_fitted_models(results: dict[str, Result], tmp_path: Path) -> None:
     assert judged.to_frame()["rms"].tolist() == other.to_frame()["rms"].tolist()
     assert len(other.to_frame(blocks=True)) == 6
     again = tc.assess(found.models["z_um"], test)
-    assert "no honest test: fitted to small" in str(again)
+    assert "not a test on unseen data: fitted to small" in str(again)
 
 
 def test_selection(results: dict[str, Result], recording: Recording) -> None:

@@ -118,7 +118,7 @@ def test_a_channel_is_no_formula_on_the_sheet() -> None:
 def test_nothing_is_overwritten_and_both_files_come_or_none(tmp_path: Path) -> None:
     program = tmp_path / "test.ngc"
     (tmp_path / "test.csv").write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match=r"test\.csv: exists already"):
+    with pytest.raises(InputError, match=r"test\.csv: the file exists already"):
         write_test(GRID[0], program, CHANNELS)
     assert not program.exists()
     assert (tmp_path / "test.csv").read_text(encoding="utf-8") == "mine"

@@ -84,7 +84,7 @@ def test_continued_is_the_whole(folder: Path, capsys: pytest.CaptureFixture[str]
     assert start["start"] == "continued"
     assert start["earlier"] == [a]
     assert (
-        "b begins 60 s after the end of a (taken as one sampling interval: neither stamped nor stated)"
+        "b begins 60 s after the end of a (assumed to be one sampling interval: no time stamps, no stated gap)"
         in start["how_known"]
     )
     (model,) = modelfile.read(folder / "model.json")

@@ -62,7 +62,7 @@ def test_many_findings_of_a_kind_are_gathered(tmp_path: Path, capsys: pytest.Cap
     table.to_csv(tmp_path / "nine.csv", index=False)
     assert run(["check", str(tmp_path / "nine.csv")]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert text.count("models assume zero") == 4
+    assert text.count("models assume a probe zeroed") == 4
     assert "warning not zeroed, 5 more: p4_um, p5_um, p6_um, p7_um, p8_um" in text
 
 

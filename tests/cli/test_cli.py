@@ -132,7 +132,7 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     assert set(results[-1]["robustness"]["noise_rms_um"]) == {"uniform", "normal"}
     assert run(["assess", str(model), str(drift)]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    assert "no honest test: fitted to drift" in said
+    assert "not a test on unseen data: fitted to drift" in said
     assert "│ averaged, │" in said
     assert "│ in-sample │" in said
     assert "in-sample: on the rows used for training" in said
@@ -155,7 +155,7 @@ def test_assess_leaves_out_what_was_learned_from(
     found = printed(capsys)
     assert found["seen_in_training"] == []
     assert found["results"][-1]["verdict"] == "refused"
-    reason = "no honest test: 239 of 239 rows were used for training; judge the model on another recording"
+    reason = "not a test on unseen data: 239 of 239 rows were used for training; judge the model on another recording"
     assert found["results"][-1]["reason"] == reason
     first, day = small_machine(dt=200.0), small_machine((2200.0, 1200.0), seed=3, dt=200.0)
     table = pd.concat([first.table.drop(index=119), day.table], ignore_index=True)
@@ -166,7 +166,7 @@ def test_assess_leaves_out_what_was_learned_from(
     found = printed(capsys)["results"][-1]
     assert (found["n_rows"], found["n_rows_learned_from"]) == (120, 239)
     run(["assess", str(model), str(copy)])
-    assert "239 of 359 rows were used for training: left out" in " ".join(capsys.readouterr().out.split())
+    assert "239 of 359 rows were used for training and are left out" in " ".join(capsys.readouterr().out.split())
 
 
 def test_what_fit_has_refused_assess_does_not_pass(
@@ -182,7 +182,7 @@ def test_what_fit_has_refused_assess_does_not_pass(
     capsys.readouterr()
     assert run(["assess", str(model), str(other)]) == 1
     out = " ".join(capsys.readouterr().out.split())
-    assert "unproven z_um: judged on 2 units, at least 3 are needed" in out
+    assert "unproven z_um: judged on only 2 of 3 required cycles or files" in out
     assert "refused when it was fitted z_um: worse than none in cycle 2" in out
     modelfile.write([fitted], model, overwrite=True)
     assert run(["assess", str(model), str(other)]) == 0

@@ -29,7 +29,7 @@ def test_it_prints_the_tests_and_writes_the_best(drift: str, capsys: pytest.Capt
     assert "S6000 M3" in Path("next.ngc").read_text(encoding="ascii")
     assert Path("next.png").read_bytes().startswith(b"\x89PNG")
     assert run([*given]) == 2
-    assert "next.ngc: exists already" in " ".join(capsys.readouterr().err.split())
+    assert "next.ngc: the file exists already" in " ".join(capsys.readouterr().err.split())
     assert run([*given, "--no-curve", "--overwrite", "--dialect", "fanuc", "--probe-every", "0"]) == 0
     assert Path("next.ngc").read_text(encoding="ascii").startswith("%\nO1001")
 
@@ -58,7 +58,7 @@ def test_a_running_test_may_end_or_not(drift: str, capsys: pytest.CaptureFixture
         (("-o", "test.csv"), "name the NC program, such as test.ngc"),
         (("-o", "test.png"), "name the NC program, such as test.ngc"),
         (("-o", "nowhere/test.ngc"), "there is no folder"),
-        (("-o", "drift.ngc", "--overwrite"), "drift.csv: is also an input"),
+        (("-o", "drift.ngc", "--overwrite"), "drift.csv: this file is also an input"),
         (("--running", "-o", "test.ngc"), "--running writes no file"),
         (("--top-speed", "-5"), "top speed -5 1/min"),
         (("--probe-every", "45", "-o", "test.ngc"), "a measurement every 45 min: expected 1 to 30"),

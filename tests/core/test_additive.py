@@ -106,7 +106,7 @@ def test_file_round_trip_is_bit_exact() -> None:
 @pytest.mark.parametrize(
     ("x", "y", "kind", "message"),
     [
-        ((0.0, 0.0), (1.0, 2.0), "linear", "must increase strictly"),
+        ((0.0, 0.0), (1.0, 2.0), "linear", "must increase strictly, but 0 follows 0"),
         ((0.0, np.nan), (1.0, 2.0), "linear", "must be finite"),
         ((0.0, 1.0), (1.0, np.inf), "linear", "must be finite"),
         ((0.0, 1.0), (1.0,), "linear", "as many as x values"),
@@ -125,7 +125,7 @@ def test_bad_curves_are_refused(x: Any, y: Any, kind: Any, message: str) -> None
     [
         ({"curves": (LINE,)}, "3 variables but 1 curves"),
         ({"intercept": float("nan")}, "must be finite"),
-        ({"variables": (Variable.single("t9", 9),), "curves": (LINE,)}, "t9: refers to an input beyond the 3"),
+        ({"variables": (Variable.single("t9", 9),), "curves": (LINE,)}, "t9: input index 9: expected 0 to 2"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: str) -> None:
@@ -137,7 +137,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], message: st
     ("name", "weights", "message"),
     [
         ("a", ((0, float("inf")),), "variable a: weights must be finite"),
-        ("none", (), "variable none: has no input"),
+        ("none", (), "variable none has no input"),
         ("two\nlines", ((0, 1.0),), r"variable: 'two\\nlines' is not a valid name"),
     ],
 )

@@ -317,7 +317,7 @@ def test_linear_numbers_that_do_not_fit(change: dict[str, object], message: str)
     [
         ({"k": 1}, "need a net of 5 inputs; found 6"),
         ({"interval": -1.0}, "interval must be from 0.001 to"),
-        ({"input_scaling": Affine((1.0,), (0.0,))}, "scaling of 1"),
+        ({"input_scaling": Affine((1.0,), (0.0,))}, "scaling for 1"),
         ({"output_scaling": Affine((1.0, 1.0), (0.0, 0.0))}, "expected one output"),
         ({"net": replace(network().net, output="identity")}, "not bounded"),
     ],

@@ -111,7 +111,7 @@ def test_only_paced_models_have_parts_and_a_step_is_positive() -> None:
     with pytest.raises(InputError, match="a term depends on several inputs"):
         contributions(replace(other, signals=((0, 1),)), table())
     for step in (0.0, -5.0, np.nan):
-        with pytest.raises(InputError, match=f"^step {step}: the time between two rows must be"):
+        with pytest.raises(InputError, match=f"^step {step}: the time between two rows .s. must be"):
             gains(MODEL, step)
     assert gains(MODEL, np.inf)[0].settled == gains(MODEL, np.inf)[0].instantaneous
 

@@ -95,7 +95,7 @@ def test_a_draft_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     target.write_text("old")
     with pytest.raises(FileNotFoundError), draft(target, overwrite=True):
         (tmp_path / "gone").read_text()  # another file's error stays what it is
-    with pytest.raises(InputError, match=r"a\.txt: cannot be written"), draft(target, overwrite=True):
+    with pytest.raises(InputError, match=r"a\.txt: the file cannot be written"), draft(target, overwrite=True):
         pass  # nothing was written
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
     assert target.read_text() == "old"
@@ -122,13 +122,13 @@ def test_a_file_that_comes_into_being_meanwhile_is_not_replaced(tmp_path: Path) 
             last.write_text("precious")
             started.publish()
 
-    with pytest.raises(InputError, match=r"a\.ngc: was created in the meantime; nothing was written"):
+    with pytest.raises(InputError, match=r"a\.ngc: the file was created in the meantime, so nothing was written"):
         meanwhile()
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.ngc": "precious"}
     put({first: "new", last: "new"})
     put({first: "newer", last: "newer"})
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a.diff": "newer", "a.ngc": "newer"}
-    with pytest.raises(InputError, match=r"a\.diff: exists already"):
+    with pytest.raises(InputError, match=r"a\.diff: the file exists already"):
         put({first: "new"}, overwrite=False)
 
 
@@ -160,12 +160,14 @@ def test_a_disk_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         return replace(self, target)
 
     monkeypatch.setattr(Path, "replace", broken)
-    with pytest.raises(InputError, match="b: cannot be written: Input/output error; an existing file is unchanged"):
+    with pytest.raises(
+        InputError, match="b: the file cannot be written: Input/output error; an existing file is unchanged"
+    ):
         put({first: "newest", last: "newest"})
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"a": "new", "b": "precious"}
     last.unlink()
     first.unlink()
-    with pytest.raises(InputError, match="b: cannot be written: Input/output error"):
+    with pytest.raises(InputError, match="b: the file cannot be written: Input/output error"):
         put({first: "newest", last: "newest"}, overwrite=False)
     assert not list(tmp_path.iterdir())
 
@@ -190,7 +192,9 @@ def test_a_disk_that_fails_leaves_all_as_it_was(
             raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", flush)
-    with pytest.raises(InputError, match="2: cannot be written: Input/output error; an existing file is unchanged"):
+    with pytest.raises(
+        InputError, match="2: the file cannot be written: Input/output error; an existing file is unchanged"
+    ):
         put(dict.fromkeys(targets, "new"))
     assert count == when + 1
     assert [(t.exists() and t.read_text()) for t in targets] == ["old" if there else False] * 2
@@ -245,7 +249,7 @@ def test_links_stay_and_their_targets_are_written(tmp_path: Path) -> None:
         assert (elsewhere / place).read_text() == name
     assert all(p.is_symlink() for p in here.iterdir())
     assert sorted(p.name for p in elsewhere.iterdir()) == ["2", "model.json", "new"]
-    with pytest.raises(InputError, match="link: exists already"):
+    with pytest.raises(InputError, match="link: the file exists already"):
         put({here / "link": "x"}, overwrite=False)
     with pytest.raises(InputError, match="two of these are the same file"):
         put({here / "link": "x", elsewhere / "model.json": "y"})
@@ -260,13 +264,13 @@ def test_what_is_no_place_for_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
     os.mkfifo(tmp_path / "pipe")
     there = sorted(tmp_path.iterdir())
     for name, said in (
-        ("round", "round: cannot be written: Too many levels of symbolic links"),
+        ("round", "round: the file cannot be written: Too many levels of symbolic links"),
         ("nowhere", "nowhere: there is no folder .*/gone; create it first"),
         ("gone/file", "gone/file: there is no folder .*/gone; create it first"),
-        ("file/file", "file/file: cannot be written: Not a directory"),
+        ("file/file", "file/file: the file cannot be written: Not a directory"),
         (".", "is a folder; name a file"),
-        ("pipe", "pipe: is a pipe or a device"),
-        ("x" * 256, "xxx: cannot be written: File name too long"),
+        ("pipe", "pipe: this is a pipe or a device"),
+        ("x" * 256, "xxx: the file cannot be written: File name too long"),
     ):
         with pytest.raises(InputError, match=said):
             put({tmp_path / name: "x"})
@@ -275,7 +279,7 @@ def test_what_is_no_place_for_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with pytest.raises(InputError, match="is a pipe or a device"):
         put({Path("/dev/null"): "x"})
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may do anything
-    with pytest.raises(InputError, match="file: is read-only"):
+    with pytest.raises(InputError, match="file: the file is read-only"):
         put({tmp_path / "file": "x"})
     assert sorted(tmp_path.iterdir()) == there
     assert (tmp_path / "file").read_text() == "mine"
@@ -287,7 +291,8 @@ def test_a_folder_where_nothing_may_be_made(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(Path, "mkdir", refused)
     with pytest.raises(
-        InputError, match=r"a: cannot be written: Permission denied; you need permission to create files in its folder"
+        InputError,
+        match=r"a: the file cannot be written: Permission denied; you need permission to create files in its folder",
     ):
         put({tmp_path / "a": "x"})
 
@@ -334,6 +339,6 @@ def test_a_full_disk_at_the_lock_leaves_no_folder(tmp_path: Path, monkeypatch: p
         raise OSError(errno.ENOSPC, "No space left on device", str(path))
 
     monkeypatch.setattr(os, "open", full)
-    with pytest.raises(InputError, match="a: cannot be written: No space left on device"):
+    with pytest.raises(InputError, match="a: the file cannot be written: No space left on device"):
         put({tmp_path / "a": "x"})
     assert not list(tmp_path.iterdir())

@@ -177,7 +177,7 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, object]) -> None:
 
 
 def test_more_inputs_than_the_model_has_are_refused() -> None:
-    with pytest.raises(InputError, match="more inputs than the model, which has 3"):
+    with pytest.raises(InputError, match="joint support for 4 inputs, but the model has 3"):
         model("clip", replace(LINE, speeds=(3,)))
 
 

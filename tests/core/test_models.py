@@ -213,7 +213,7 @@ def test_terms_of_differences() -> None:
     [
         ({"coefficients": (1.0, 2.0)}, "1 terms but 2 coefficients"),
         ({"coefficients": (float("nan"),)}, "must be finite"),
-        ({"terms": ((4,),)}, "beyond the 1 given"),
+        ({"terms": ((4,),)}, "expected at least one variable index, from 0 to 0"),
         ({"inputs": (temperature("t"), temperature("t"))}, "named twice"),
     ],
 )

@@ -109,17 +109,17 @@ def test_what_it_is_made_of_has_names() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "expected 1 coefficients in lagged"),
-        ({"temperatures": (LaggedInput(2, 0.5, (1.0,)),)}, "beyond the 2 inputs"),
+        ({"temperatures": (LaggedInput(0, 0.5, ()),)}, "lagged coefficients of input 0: expected 1"),
+        ({"temperatures": (LaggedInput(2, 0.5, (1.0,)),)}, "temperature 0: input index 2: expected 0 to 1"),
         ({"states": (SpeedState(1, 2.0, 600.0, 1200.0, 1.0),)}, "the first must not be longer"),
         ({"states": (SpeedState(1, 20.0, 3600.0, 1200.0, 1.0),)}, "power"),
         ({"states": (SpeedState(1, 2.0, float("nan"), 1200.0, 1.0),)}, "stopped"),
         ({"states": (SpeedState(1, 2.0, 3600.0, 1200.0, float("inf")),)}, "weight"),
         ({"time_constants": (0.0,)}, "time_constants"),
         ({"top_speed": 0.0}, "top_speed"),
-        ({"spread": ((1.0,),)}, "expected 3 numbers in each row"),
+        ({"spread": ((1.0,),)}, "a row of spread has 1 numbers; expected 3"),
         ({"spread": ((1.0, 1.0, float("nan")),)}, "spread"),
-        ({"band": Band(0.9, "conformal", 9, 1.0, 1.0, 1.0, (2,))}, "band has more inputs"),
+        ({"band": Band(0.9, "conformal", 9, 1.0, 1.0, 1.0, (2,))}, "band uses input index 2: expected 0 to 1"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], says: str) -> None:

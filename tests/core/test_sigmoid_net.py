@@ -129,8 +129,8 @@ def test_formula_and_coefficients() -> None:
     ("change", "message"),
     [
         ({"hidden_weights": ((1.0, 2.0),)}, "weights of 1 hidden nodes and 1 outputs, but thresholds of 2 and 1"),
-        ({"hidden_weights": ((1.0, 2.0), (1.0,))}, "every hidden node needs 2 weights"),
-        ({"output_weights": ((1.0,),)}, "each of 1 outputs needs 2 weights"),
+        ({"hidden_weights": ((1.0, 2.0), (1.0,))}, "expected 2 weights per hidden node"),
+        ({"output_weights": ((1.0,),)}, "expected 2 weights for each of 1 outputs"),
         ({"output_weights": ((1.0, float("nan")),)}, "must be finite"),
         ({"output_thresholds": (float("inf"),)}, "must be finite"),
         ({"output_thresholds": ()}, "both layers need at least one node"),

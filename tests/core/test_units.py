@@ -76,5 +76,5 @@ def test_what_is_no_value_with_its_unit(text: object) -> None:
 def test_a_value_with_a_wrong_unit_or_without_end() -> None:
     with pytest.raises(UnitError, match="'degC' measures temperature, not position"):
         read_with_unit("250 degC", "position")
-    with pytest.raises(UnitError, match="is not a finite number"):
+    with pytest.raises(UnitError, match="the value is not a finite number"):
         read_with_unit("1e999 mm", "position")

@@ -257,7 +257,7 @@ def test_models_that_average_their_zero_in_different_ways(tmp_path: Path, capsys
     other = replace(judged("y_um", ACCEPTED), zeroing=watched_model("z_um").zeroing)
     model = written(tmp_path, judged("x_um", ACCEPTED), other)
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
-    assert "export each file separately" in capsys.readouterr().err
+    assert "export each model file separately" in capsys.readouterr().err
 
 
 def prove_graph(folder: Path) -> subprocess.CompletedProcess[str]:

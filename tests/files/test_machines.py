@@ -189,7 +189,7 @@ MM = 'write a length with its unit, such as "600 mm"'
         (HEAD.replace('"600 mm"', '"600"'), f'axes.X.travel: "600": {MM}'),
         (HEAD.replace('"600 mm"', '"6.0.0 mm"'), f'axes.X.travel: "6.0.0 mm": {MM}'),
         (HEAD.replace('"600 mm"', '"nan mm"'), f'axes.X.travel: "nan mm": {MM}'),
-        (HEAD.replace('"600 mm"', '"1e999 mm"'), 'axes.X.travel: "1e999 mm": is not a finite number'),
+        (HEAD.replace('"600 mm"', '"1e999 mm"'), 'axes.X.travel: "1e999 mm": the value is not a finite number'),
         (HEAD.replace('"600 mm"', '"600 parsec"'), "axes.X.travel: \"600 parsec\": unknown unit 'parsec'"),
         (
             HEAD.replace('"600 mm"', '"6 degC"'),

@@ -190,7 +190,7 @@ def test_a_disk_that_does_not_flush_leaves_the_old_files(
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", broken)
-        with pytest.raises(InputError, match=f"{writer.last}: cannot be written: Input/output error"):
+        with pytest.raises(InputError, match=f"{writer.last}: the file cannot be written: Input/output error"):
             writer.write(folder, 1)
     assert contents(folder) == before
 
@@ -237,7 +237,7 @@ def test_a_full_disk_leaves_the_old_files(kind: str, small_disk: Path, tmp_path:
         assert contents(folder) == (before if said else wanted)
         if said:
             failed += 1
-            assert f"{writer.last}: cannot be written: No space left on device" in " ".join(said.split())
+            assert f"{writer.last}: the file cannot be written: No space left on device" in " ".join(said.split())
         else:
             done += 1
     assert failed >= 2
@@ -259,7 +259,7 @@ def test_a_full_disk_is_an_unusable_output_on_the_command_line(
     code = run(["check", str(tmp_path / "drift.csv"), "-o", str(page), "--overwrite"])
     filler.unlink()
     assert code == 2
-    assert f"error: {page}: cannot be written: No space left on device" in capsys.readouterr().err
+    assert f"error: {page}: the file cannot be written: No space left on device" in capsys.readouterr().err
     assert page.read_text() == "old"
     assert list(folder.iterdir()) == [page]
 
@@ -277,7 +277,7 @@ def test_what_comes_into_being_during_the_work_is_not_replaced(
 
     monkeypatch.setattr(mending, "read_or_offer", meanwhile)
     assert run(["check", str(tmp_path / "drift.csv"), "-o", str(page)]) == 2
-    assert "check.html: exists already" in " ".join(capsys.readouterr().err.split())
+    assert "check.html: the file exists already" in " ".join(capsys.readouterr().err.split())
     assert page.read_text() == "precious"
 
 

@@ -180,7 +180,7 @@ def test_what_does_not_go_with_the_test_is_told(tmp_path: Path, capsys: pytest.C
     assert run(["iso230", str(rest)]) == 0
     assert "neither a spindle speed nor a feed was recorded" in " ".join(capsys.readouterr().out.split())
     assert run(["iso230", str(rest), "--test", "spindle"]) == 0
-    assert "no turning spindle was recorded" in " ".join(capsys.readouterr().out.split())
+    assert "the recording shows no turning spindle" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_page_has_the_name_of_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

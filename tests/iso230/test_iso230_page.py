@@ -88,7 +88,7 @@ def test_a_single_run_on_the_page() -> None:
     up = 0.01 * positions[None]
     text = pages.render([], [], [part2.assess(Positioning("X", "", "um", positions, up, up - 2, "x.csv"))])
     assert "mean ↑ of a single run" in text
-    assert "a single run in direction +: s, R and A require more" in text
+    assert "a single run in direction +: s, R and A need at least two" in text
     assert "measurement uncertainty is not given" in text
     assert "nan" not in text.lower().replace("finance", "")
 

@@ -156,7 +156,8 @@ def test_a_single_run_tells_systematic_values_only() -> None:
     assert r.repeatability is None
     assert np.isnan([r.A, r.R]).all()
     assert r.notes == tuple(
-        f"a single run in direction {d}: s, R and A require more; ISO 230-2 requires no more over 2 m" for d in "+-"
+        f"a single run in direction {d}: s, R and A need at least two; ISO 230-2 requires no more over 2 m"
+        for d in "+-"
     )
     main, at_targets = positioning_tables([r])
     assert [row[0] for row in main.rows] == ["E↑", "E↓", "E", "M", "B", "mean B"]
@@ -168,7 +169,9 @@ def test_a_single_run_tells_systematic_values_only() -> None:
     r = assess(Positioning("X", "", "um", positions, np.concatenate([up, up + 1.0]), up))
     assert {"A↑", "R↑", "E", "B"} <= r.axis_values.keys()
     assert not {"A↓", "R↓", "A", "R"} & r.axis_values.keys()
-    assert r.notes == ("a single run in direction -: s, R and A require more; ISO 230-2 requires no more over 2 m",)
+    assert r.notes == (
+        "a single run in direction -: s, R and A need at least two; ISO 230-2 requires no more over 2 m",
+    )
 
 
 def test_what_is_wanted_changes_at_2_m() -> None:
@@ -179,7 +182,7 @@ def test_what_is_wanted_changes_at_2_m() -> None:
     assert notes(2000.0, 10, 5) == ()
     assert notes(2000.0, 9, 5) == ("9 targets over 2 m; ISO 230-2 requires at least 10",)
     short = notes(2000.0, 10, 1)
-    assert short[0] == "a single run in direction +: s, R and A require more, ISO 230-2 requires 5"
+    assert short[0] == "a single run in direction +: s, R and A need at least two, ISO 230-2 requires 5"
     assert notes(2250.0, 10, 3) == ()
     assert notes(2250.0, 9, 5) == ("9 targets over 2.25 m; ISO 230-2 requires at least 10",)
 

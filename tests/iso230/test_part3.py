@@ -157,7 +157,7 @@ def test_the_last_hour_against_the_first() -> None:
     (said,) = (n for n in test.notes if n.startswith("range of the last 60 min"))
     assert said == (
         "range of the last 60 min to that of the first: y1_um 0 %, y2_um 0 %, z_um 0 %; all are within the 15 % at "
-        "which ISO 230-3 permits a spindle test to end before 4 h (from memory)"
+        "which ISO 230-3 permits a spindle test to end before 4 h (not checked against the text of the standard)"
     )
     (slow,) = assess(spindle_test(180 * MIN))
     share = 100 * np.exp(-1.0)
@@ -327,14 +327,14 @@ def test_detection_and_ambient() -> None:
 def test_what_falls_short_is_said() -> None:
     (test,) = assess(recorded({"z_um": np.arange(30.0), "s_rpm": np.full(30, 100.0)}), "etve")
     notes = " | ".join(test.notes)
-    assert "the test ran for 29 min only" in notes
+    assert "the test ran for only 29 min" in notes
     assert "the spindle or an axis moves" in notes
     assert "the test is 0.5 h long" in notes
     assert "no ambient temperature was identified" in notes
     (unrecorded,) = assess(recorded({"z_um": np.arange(90.0)}), "axis")
     notes = " | ".join(unrecorded.notes)
     assert "the whole recording counts as warm-up; record the feed rate" in notes
-    assert "no channel is a target position of an axis" in notes
+    assert "no channel contains the error at a target position of an axis" in notes
     assert "the cool-down was not recorded" in notes
     assert unrecorded.load == "feed rate not recorded"
 
@@ -343,7 +343,7 @@ def test_refusals() -> None:
     only_heat = recorded({"t_C": np.ones(30)})
     with pytest.raises(InputError, match="no displacement"):
         assess(only_heat)
-    with pytest.raises(InputError, match="has one row"):
+    with pytest.raises(InputError, match="has only one row"):
         assess(recorded({"z_um": np.ones(1)}))
     with pytest.raises(InputError, match="the ambient channel is a temperature"):
         assess(spindle_test(), ambient="z_um")
@@ -422,7 +422,9 @@ def test_rows_that_a_model_has_learned_from_are_counted() -> None:
     assert learned.provenance is not None
     learned = replace(learned, provenance=replace(learned.provenance, data_sha256=("another file",)))
     told = [note for test in assess(recording, models=[learned]) for note in test.notes]
-    wanted = "the model of z_um: 500 of 800 rows were used for training: its residual there is not an honest test"
+    wanted = (
+        "the model of z_um: 500 of 800 rows were used for training: its residual there is not a test on unseen data"
+    )
     assert {n for n in told if "used for training" in n} == {wanted}
     told = [note for test in assess(other, models=[learned]) for note in test.notes]
     assert not [n for n in told if "used for training" in n]

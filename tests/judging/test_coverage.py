@@ -121,7 +121,7 @@ def test_constant_inputs_and_no_units_are_no_trouble() -> None:
     samples = stack([plain], ["z_um"])
     nothing = coverage.find_validity(samples, splits.Judging("none", ()))
     assert (nothing.units, nothing.independent, nothing.hours) == (0, 0, 0.0)
-    with pytest.raises(InputError, match="5 of 4 units are independent"):
+    with pytest.raises(InputError, match="independent = 5: expected 0 to units = 4"):
         replace(found, independent=5)
 
 

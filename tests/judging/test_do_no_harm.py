@@ -52,7 +52,7 @@ def test_four_alike_units_that_are_better_are_accepted() -> None:
 def test_two_units_show_nothing(n: int) -> None:
     verdict = Verdict(tuple(unit(0.1 + 0.01 * k) for k in range(n)))
     assert verdict.word == "unproven"
-    assert f"judged on {n} unit" in verdict.reason
+    assert f"judged on only {n} of 3" in verdict.reason
     assert f"record {3 - n} more thermal cycle{'s' * (n == 1)}, at" in verdict.advice
 
 

@@ -260,4 +260,4 @@ def test_trouble_of_a_temperature_caps_the_verdict_where_no_watch_could_look() -
     )
     (seen,), (unseen,) = (assessing.assess([model], [r], starts=Start()).overall() for r in (recording, blind))
     assert not any("t1_C" in cap for cap in seen.verdict.caps)
-    assert any("t1_C has trouble" in cap for cap in unseen.verdict.caps)
+    assert any("data-quality problem in t1_C" in cap for cap in unseen.verdict.caps)

@@ -56,7 +56,7 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
         (overall,) = judged.overall()
         assert not overall.accepted
         assert overall.reason == (
-            f"no honest test: {len(copy)} of {len(copy)} rows were used for training; judge the model on "
+            f"not a test on unseen data: {len(copy)} of {len(copy)} rows were used for training; judge the model on "
             "another recording"
         )
         assert overall.learned == len(overall.measured) == len(copy)
@@ -71,7 +71,7 @@ def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[E
     assert overall.row.tolist() == list(range(800, 1600))
     assert overall.word == "unproven"  # its level is that of the rows that were learned
     assert overall.reason.startswith("judged on one section that continues the training data")
-    assert overall.reason.endswith("; 800 of 1,600 rows were used for training: left out")
+    assert overall.reason.endswith("; 800 of 1,600 rows were used for training and are left out")
     # a piece of it in the middle of two days, in a file of its own beside a whole one
     both = [after(day, of(recording.table.iloc[100:500], recording)), small_machine(DAY, seed=6)]
     (overall,) = assessing.assess(models, [replace(r, name=f"{k}") for k, r in enumerate(both)]).overall()
@@ -89,7 +89,7 @@ def test_the_file_itself_is_left_out_beside_another(recording: Recording, models
     assert set(overall.test) == {1}
     assert overall.accepted
     alone = assessing.assess(models, [recording]).overall()[0]
-    assert alone.reason == "no honest test: fitted to small; judge the model on another recording"
+    assert alone.reason == "not a test on unseen data: fitted to small; judge the model on another recording"
     # a model from before there were fingerprints knows the file, and no copy
     (model,) = models
     assert model.provenance is not None
@@ -111,7 +111,7 @@ def test_a_column_that_has_another_name_in_the_file_is_known(
     )
     (overall,) = assessing.assess(models, [other]).overall()
     assert overall.target == "z_um"
-    assert overall.caveat.startswith("no honest test: 800 of 800 rows")
+    assert overall.caveat.startswith("not a test on unseen data: 800 of 800 rows")
 
 
 def test_what_little_is_left_of_a_copy_is_no_test(models: tuple[ErrorModel, ...]) -> None:
@@ -143,7 +143,9 @@ def samples_of(*recordings: Recording) -> Samples:
 
 def test_a_cycle_that_comes_twice_is_refused_with_its_rows(recording: Recording) -> None:
     samples = samples_of(repeated(recording, 200, 400))
-    wanted = r"small: rows 800-999 repeat rows 200-399 of the same recording, approximately: with cycle 2 .* left out"
+    wanted = (
+        r"small: rows 800-999 repeat rows 200-399 of the same recording .approximate rows.: with cycle 2 .* left out"
+    )
     with pytest.raises(InputError, match=wanted):
         compare(samples, ["ols"], splits.leave_one_cycle_out(samples))
     with pytest.raises(InputError, match=wanted):
@@ -163,7 +165,7 @@ def test_two_files_that_share_rows_are_refused_with_both_names(recording: Record
     other = replace(after(small_machine(DAY, seed=5), of(recording.table.iloc[300:500], recording)), name="other")
     tests = [replace(r, cycles=make_single_cycle(len(r))) for r in (recording, other)]
     samples = samples_of(*tests)
-    with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small, approximately"):
+    with pytest.raises(InputError, match=r"other: rows 800-999 repeat rows 300-499 of small .approximate rows."):
         compare(samples, ["ols"], splits.leave_one_file_out(samples))
     apart = samples_of(recording, replace(small_machine(DAY, seed=5), name="other"))
     assert compare(apart, ["ols"], splits.leave_one_file_out(apart), robustness=False).overall()
@@ -186,5 +188,6 @@ def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> Non
     (overall,) = assessing.assess(models, copies, starts=COLD).overall()
     assert overall.word == "unproven"
     assert overall.reason == (
-        "only 1 of 3 units are distinct, at least 3 are needed; record cycles at other speeds or on other days"
+        "only 1 of 3 cycles or files are distinct, at least 3 are needed; "
+        "record cycles at other speeds or on other days"
     )

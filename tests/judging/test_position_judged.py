@@ -96,7 +96,7 @@ def test_too_few_states_prove_nothing() -> None:
     judged = study(replace(made, values=values), OLS).assessment
     assert not judged.accepted
     assert judged.cycles[1].n_states == 6
-    assert judged.reason.startswith("judged on 2 units, at least 3 are needed; record 1 more")
+    assert judged.reason.startswith("judged on only 2 of 3 required cycles or files; record 1 more")
     with pytest.raises(InputError, match="only one thermal cycle"):
         study(profiles(n_cycles=1), OLS)
     values[24:] = np.nan

@@ -55,7 +55,7 @@ def test_the_recommended_method_is_judged_with_its_choosing() -> None:
     best = result.best("z_um")
     assert best is not None
     assert best.model == "dynamic"
-    assert "3 methods tried, selected again without each unit" in best.reason
+    assert "3 methods tried, selected again in each fold" in best.reason
 
 
 def test_one_that_is_named_beforehand_is_not_corrected() -> None:

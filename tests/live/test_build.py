@@ -117,7 +117,7 @@ token_file = "token.txt"
     with pytest.raises(InputError) as caught:
         build(read_config(path))
     said = str(caught.value)
-    for word in ("a.json: no", "b.json: no", "c.csv: no", "token.txt: no", "none", "folder.json: is a", "nowhere"):
+    for word in ("a.json: no", "b.json: no", "c.csv: no", "token.txt: no", "none", "folder.json: this is a", "nowhere"):
         assert word in said
     assert len(said.splitlines()) == 8
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder.json", "serve.toml"]

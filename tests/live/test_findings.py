@@ -93,7 +93,7 @@ def test_what_is_good_passes_and_nothing_is_written(tmp_path: Path) -> None:
                 ("#/", "put it at the end"),
                 ("", "name a topic"),
                 ("  ", "name a topic"),
-                ("a\\u0000b", "cannot be printed"),
+                ("a\\u0000b", "non-printable characters"),
                 ("$share/g", "$share/GROUP/TOPIC"),
                 ("$share/+/t", "$share/GROUP/TOPIC"),
                 ("é" * 40_000, "longer than 65,535 bytes"),
@@ -164,16 +164,16 @@ def faults(path: Path) -> list[str]:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('state = "state.json"', 'state = "day.csv"', "day.csv: is named more than once"),
-        ('state = "state.json"', 'state = "out.json"', "out.json: is named more than once"),
-        ('state = "state.json"', 'state = "live.db"', "live.db: is named more than once"),
-        ('state = "state.json"', 'state = "./model.json"', "model.json: is named more than once"),
-        ('file = "out.json"', 'file = "pipe"', "pipe: is a pipe or a device"),
+        ('state = "state.json"', 'state = "day.csv"', "day.csv: this file is named more than once"),
+        ('state = "state.json"', 'state = "out.json"', "out.json: this file is named more than once"),
+        ('state = "state.json"', 'state = "live.db"', "live.db: this file is named more than once"),
+        ('state = "state.json"', 'state = "./model.json"', "model.json: this file is named more than once"),
+        ('file = "out.json"', 'file = "pipe"', "pipe: this is a pipe or a device"),
         ('file = "out.json"', 'file = "none/out.json"', "there is no folder"),
         ('file = "out.json"', 'file = "."', "is a folder"),
-        ('file = "day.csv"', 'file = "token.txt"', "token.txt: has no column time_s"),
-        ('file = "day.csv"', 'file = "broken.csv"', "broken.csv: line 3: cannot be read"),
-        ('token_file = "token.txt"', 'token_file = "short.txt"', "short.txt: a token of 5 characters"),
+        ('file = "day.csv"', 'file = "token.txt"', "token.txt: the file has no column time_s"),
+        ('file = "day.csv"', 'file = "broken.csv"', "broken.csv: line 3 cannot be read"),
+        ('token_file = "token.txt"', 'token_file = "short.txt"', "short.txt: the token has only 5 characters"),
         ('token_file = "token.txt"', 'token_file = "missing.txt"', "missing.txt: no such file"),
         ("port = 0", 'host = "203.0.113.7"', "page on 203.0.113.7"),
         ("port = 0", 'host = "nowhere.invalid"', "page on nowhere.invalid"),
@@ -208,7 +208,7 @@ def test_what_the_service_itself_writes_is_no_sink(name: str, tmp_path: Path) ->
 def test_a_lock_that_cannot_be_opened(tmp_path: Path) -> None:
     (tmp_path / "state.json.lock").mkdir()
     long = "s" * 252
-    for text, says in ((GOOD, "state.json.lock: is a folder"), (GOOD.replace("state.json", long), "at most 255")):
+    for text, says in ((GOOD, "state.json.lock: this is a folder"), (GOOD.replace("state.json", long), "at most 255")):
         assert any(says in fault for fault in find_faults(read_config(lay(tmp_path, text))))
 
 
@@ -218,7 +218,7 @@ def test_an_axis_that_the_set_up_does_not_correct(tmp_path: Path) -> None:
     hal = tmp_path / "thermocomp.hal"
     hal.write_text("loadusr -Wn thermocomp python3 thermocomp_hal.py --axis x,0.0,1.0 --unit mm\n", encoding="ascii")
     (found,) = faults(path)
-    assert "does not correct Z" in found
+    assert "no correction of axis Z" in found
     hal.write_text("loadusr ... --axis x,0.0,1.0 --axis z,-5.0,1.0 --unit mm\n", encoding="ascii")
     assert faults(path) == []
 

@@ -225,10 +225,22 @@ def test_events_are_not_drowned(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('topic = "m"', 'topic = "m\\u0007"', "sources.1.topic: 'm\\x07' has characters that cannot be printed"),
-        ('topic = "m"', 'topic = "m"\nnames = {"a\\u202E" = "t"}', "sources.1.names: 'a\\u202e' has characters"),
-        ('topic = "m"', 'topic = "m"\nnames = {a = "t\\n"}', "sources.1.names.a: 't\\n' has characters"),
-        ('topic = "m"', 'topic = "m"\nhost = "a\\u0000b"', "sources.1.host: 'a\\x00b' has characters"),
+        ('topic = "m"', 'topic = "m\\u0007"', "sources.1.topic: 'm\\x07' contains non-printable characters"),
+        (
+            'topic = "m"',
+            'topic = "m"\nnames = {"a\\u202E" = "t"}',
+            "sources.1.names: 'a\\u202e' contains non-printable characters",
+        ),
+        (
+            'topic = "m"',
+            'topic = "m"\nnames = {a = "t\\n"}',
+            "sources.1.names.a: 't\\n' contains non-printable characters",
+        ),
+        (
+            'topic = "m"',
+            'topic = "m"\nhost = "a\\u0000b"',
+            "sources.1.host: 'a\\x00b' contains non-printable characters",
+        ),
         ("[[sources]]", f'state = "{"s" * 70_000}"\n[[sources]]', "characters; at most 65,535"),
     ],
 )
@@ -245,13 +257,13 @@ def test_a_configuration_with_text_that_cannot_be_printed(old: str, new: str, sa
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"time_s,t\x07_C\n0,20\n", "line 1: 't\\x07_C' has characters"),
+        (b"time_s,t\x07_C\n0,20\n", "line 1: 't\\x07_C' contains non-printable characters"),
         (b"time_s," + b"t" * 500 + b"\n0,20\n", "at most 200"),
-        (b"time_s,t_C\n0,20\n1,\xff\n2,20\n", ": cannot be read"),
-        (b"time_s,\xff\n0,20\n", ": cannot be read"),
+        (b"time_s,t_C\n0,20\n1,\xff\n2,20\n", " cannot be read"),
+        (b"time_s,\xff\n0,20\n", " cannot be read"),
         (b"t_C\n20\n", "no column time_s"),
         (b"", "no column time_s"),
-        (b'time_s,t_C\n0,"' + b"x" * 200_000 + b'"\n', ": cannot be read"),
+        (b'time_s,t_C\n0,"' + b"x" * 200_000 + b'"\n', " cannot be read"),
     ],
 )
 def test_a_recording_that_cannot_be_replayed(content: bytes, says: str, tmp_path: Path) -> None:

@@ -753,13 +753,13 @@ def test_what_is_no_journal(tmp_path: Path) -> None:
         JournalReader(tmp_path / "nothing.db")
     text = tmp_path / "notes.txt"
     text.write_text("no database " * 100)
-    with pytest.raises(InputError, match=r"notes\.txt: is not a journal of thermocomp, and not a database"):
+    with pytest.raises(InputError, match=r"notes\.txt: this is not a journal of thermocomp, and not a database"):
         JournalReader(text)
     other = tmp_path / "other.db"
     with sqlite3.connect(other) as connection:
         connection.execute("CREATE TABLE rows (id INTEGER)")
     connection.close()
-    with pytest.raises(InputError, match=r"other\.db: is not a journal of thermocomp but another database"):
+    with pytest.raises(InputError, match=r"other\.db: this is not a journal of thermocomp but another database"):
         JournalReader(other)
 
 

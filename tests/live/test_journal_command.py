@@ -93,7 +93,7 @@ def test_export_and_fit(live: Journal, capsys: pytest.CaptureFixture[str]) -> No
     assert run(["fit", "week.csv", "--target", "z_um", "--model", "ols", "--jobs", "1", "-o", "model.json"]) == 0
     assert run(["assess", "model.json", "week.csv"]) in (0, 1)
     assert run(["journal", "export", "live.db", "-o", "week.csv"]) == 2
-    assert "week.csv: exists already" in capsys.readouterr().err
+    assert "week.csv: the file exists already" in capsys.readouterr().err
     assert run(["journal", "export", "live.db", "-o", "week.csv", "--overwrite", "--every", "600"]) == 0
     assert len(recordings.read("week.csv")) == 80
 

@@ -238,7 +238,7 @@ def test_no_spindle_speed() -> None:
         ({"k": -1}, "order k: -1"),
         ({"m_max": -1}, "order m: -1"),
         ({"criterion": "r2"}, "criterion 'r2'"),
-        ({"inputs": ["rpm"]}, "input 'rpm': the columns are x0"),
+        ({"inputs": ["rpm"]}, "input 'rpm': no such column; the columns are x0"),
         ({"inputs": [0, 0]}, "given twice"),
         ({"inputs": [3]}, "beyond the 1 columns"),
     ],
@@ -267,7 +267,7 @@ def test_bad_settings_of_the_net(settings_: dict[str, Any]) -> None:
 )
 def test_bad_data(estimator: ARX | NetARX) -> None:
     u, z = series((1, 0), 0, n=50)
-    with pytest.raises(FitError, match=r"only [012] ticks have a known past"):
+    with pytest.raises(FitError, match=r"only [012] time steps have all the earlier values"):
         estimator.fit(u[:3], z[:3], dt=clock(3))
     with pytest.raises(InputError, match="dt: expected 50 non-negative time steps"):
         estimator.fit(u, z, dt=[1.0])
@@ -313,7 +313,7 @@ def test_few_rows_shrink_the_search() -> None:
     e = ARX(time="routed").fit(u, z, dt=clock(9))
     assert max(o.k for o in e.orders_) < 5
     assert all(o.n_parameters < o.n_rows for o in e.orders_ if o.admissible)
-    with pytest.raises(FitError, match="only 0 ticks"):
+    with pytest.raises(FitError, match="only 0 time steps"):
         ARX(time="none", k=1, m=0).fit(u, z)  # no row has a past
 
 

@@ -306,7 +306,7 @@ def test_no_row_to_learn_from() -> None:
     ("setting", "message"),
     [
         ({"hidden": 0}, "0 hidden nodes"),
-        ({"hidden": ()}, "no number of hidden nodes to choose from"),
+        ({"hidden": ()}, "expected at least one number of hidden nodes"),
         ({"n_epochs": 0}, "0 epochs"),
         ({"learning_rate": 0.1, "final_learning_rate": 0.2}, "expected at least one epoch and start >= end > 0"),
         ({"schedule": "stepwise"}, "schedule 'stepwise'"),

@@ -94,7 +94,7 @@ def test_a_profile_of_two_coordinates() -> None:
     assert alone.order[1] == 0
     assert off(alone.profile.at(points), truth(points)) > 0.7
     assert off(found.profile.at(points), truth(points)) < 0.1
-    with pytest.raises(InputError, match="a spline depends on Y only: for the coordinates YX choose a polynomial"):
+    with pytest.raises(InputError, match="a spline depends on Y only; choose a polynomial for the coordinates YX"):
         fit_profile(points, values, "Y", kind="spline", coordinates="YX")
 
 
@@ -292,7 +292,7 @@ def test_missed_points_do_no_harm() -> None:
     assert off(holed.model.profile.at(GRID), whole.model.profile.at(GRID)) < 0.3  # type: ignore[union-attr]
     values[0, -1] = np.nan
     with pytest.raises(
-        FitError, match="the cold profile has no value at 550 mm, where other profiles have one: name more"
+        FitError, match="the cold profile has no value at 550 mm, where other profiles have one: specify more"
     ):
         fit_position(replace(made, values=values), method)
     assert fit_position(replace(made, values=values), replace(method, reference=(0, 1))).model.profile
@@ -346,7 +346,7 @@ def test_only_what_may_be_learned_from_is_learned() -> None:
     clean, dirty = (fit_position([tests[0], other], method, learn=learn) for other in (tests[1], spoiled))
     assert clean.model.profile == dirty.model.profile
     assert clean.model.slopes[0].coefficients_by_name() == dirty.model.slopes[0].coefficients_by_name()
-    with pytest.raises(FitError, match="no state is left for training"):
+    with pytest.raises(FitError, match="no thermal state is left for training"):
         fit_position(tests, method, learn=np.zeros(48, dtype=np.bool_))
 
 

@@ -79,7 +79,7 @@ def test_only_states_that_may_be_learned_from_are_looked_at() -> None:
     assert fill_options(later).slopes == 2
     assert fill_options(later, learn=learn) == fill_options(straight, learn=learn)
     assert fill_options(later, learn=learn).slopes == 1
-    with pytest.raises(FitError, match="no state is left for training"):
+    with pytest.raises(FitError, match="no thermal state is left for training"):
         fill_options(later, learn=np.zeros(72, dtype=np.bool_))
 
 

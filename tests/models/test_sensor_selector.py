@@ -84,7 +84,7 @@ def test_bad_settings(crowded: Samples) -> None:
     X, y = crowded.frame(), crowded.deviations[:, 0]
     for wrong, message in (
         (SensorSelector("best"), "method 'best': expected one of grouping, partial-f"),
-        (SensorSelector(keep=["t99"]), "keep 't99': the columns are t1_C"),
+        (SensorSelector(keep=["t99"]), "keep 't99': no such column; the columns are t1_C"),
         (SensorSelector(keep=[70]), "keep 70: expected an index from 0 to 6"),
         (SensorSelector(keep=list(X.columns)), "keep contains every column"),
         (SensorSelector(time="routed"), "time='routed': expected 'column' or None"),  # type: ignore[arg-type]

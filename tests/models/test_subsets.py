@@ -274,7 +274,9 @@ def test_dependent_columns_are_searched_by_adding() -> None:
     assert [s.columns for s in few.best] == [t[0][1] for t in twin_subsets.every_set(wide, drift, 4)]
     assert few.proven
     assert len(best_subsets(wide, drift).best) == 8
-    with pytest.raises(InputError, match=r"60 columns of rank 29 .* give a small max_size"):
+    with pytest.raises(
+        InputError, match=r"60 columns of rank 29 .* so the search cannot start from all of them; give a small max_size"
+    ):
         best_subsets(rng.normal(size=(30, 60)), rng.normal(size=30))
 
 

@@ -243,7 +243,7 @@ def test_a_room_that_stays_as_it_was_moves_nothing() -> None:
         (["t3=20"], "unit, such as t3=21.5degC"),
         (["t3"], "unit"),
         (["t3=20um"], "measures displacement"),
-        (["spindle=20rpm"], "comes from the program"),
+        (["spindle=20rpm"], "is taken from the program"),
         (["t3=20degC", "t3_C=21degC"], "given before"),
     ],
 )

@@ -40,6 +40,6 @@ def test_what_is_written_is_whole_or_not_there(tmp_path: Path, monkeypatch: pyte
     found = expanding.expand(program, out)
     assert (found.path, list(found.sources), found.acts) == (out, [1], 7)
     assert out.read_text() == "G21\n"
-    with pytest.raises(InputError, match=r"out\.ngc: exists already"):
+    with pytest.raises(InputError, match=r"out\.ngc: the file exists already"):
         expanding.expand(program, out)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out.ngc", "p.ngc"]

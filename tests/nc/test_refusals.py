@@ -191,7 +191,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("M10", "if it does not affect axes and spindle: --harmless M10"),
         ("G999", "not a known code (fanuc), so its effect is unknown; replace it with supported codes"),
         ("T0101", "a lathe program, in which X is a diameter"),
-        ("T1212\nG0 X1.\nG1 X2. F100", "T1212 before, and no M6: this is a lathe program"),
+        ("T1212\nG0 X1.\nG1 X2. F100", "T1212 on an earlier line, and no M6: this is a lathe program"),
         ("G50 S2500", "a lathe program"),
         ("G0 X1. Z1.\nG50 X200. Z100.", "a lathe program"),
         ("G54 P1", "write G54.1 P1"),

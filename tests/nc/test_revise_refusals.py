@@ -59,7 +59,7 @@ def test_nothing_is_written_over(job_folder: Path, name: str, capsys: pytest.Cap
     Path(name).write_text("precious", encoding="ascii")
     before = set(job_folder.iterdir())
     assert revise() == 2
-    assert f"{name}: exists already" in said(capsys)
+    assert f"{name}: the file exists already" in said(capsys)
     assert Path(name).read_text(encoding="ascii") == "precious"
     assert set(job_folder.iterdir()) == before
     assert revise("--overwrite") == 0
@@ -125,7 +125,7 @@ def test_a_refusal_leaves_an_earlier_run_as_it_was(job_folder: Path) -> None:
         (
             judged(lags("z_um")),
             ["--harmless", "M3"],
-            "M3 is a known code (spindle on, clockwise) and is followed as such",
+            "M3 is a known code (spindle on, clockwise), whose effect is taken",
         ),
         (judged(lags("z_um")), ["--tolerance", "0 um"], "must be positive"),
         (judged(lags("z_um")), ["--largest", "5 um"], "more than 5 um is not plausible as thermal drift"),

@@ -83,7 +83,9 @@ def test_where_cycles_go_back_to_can_be_told(job_folder: Path, proved: bool, req
 def test_a_loop_of_cycles_is_unrolled_as_told(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written(LOOP)
     assert revise("--expand") == 2
-    assert "part.ngc: line 6: it cannot be expanded: the end position in Z depends on" in said(capsys)
+    assert "part.ngc: line 6: the program cannot be written as plain lines: the end position in Z depends on" in said(
+        capsys
+    )
     plain = {}
     for code in ("G98", "G99"):
         options = ["--startup", f"G64 P0.01 {code}", "--tolerance", "0.1 um", "--json", "--overwrite"]
@@ -100,7 +102,10 @@ def test_cutter_compensation_is_worked_out_for_diameters(job_folder: Path, capsy
     written(POCKET)
     for options in ([], ["--diameter", "2=10 mm"]):
         assert revise("--expand", *options) == 2
-        assert "part.ngc: line 8: it cannot be expanded: the end position in X, Y depends on" in said(capsys)
+        assert (
+            "part.ngc: line 8: the program cannot be written as plain lines: the end position in X, Y depends on"
+            in said(capsys)
+        )
     assert revise("--expand", "--diameter", "1=10 mm", "T2=8 mm", proved=True) == 0
     plain = Path("out.ngc.expanded").read_text(encoding="ascii").splitlines()
     assert "G1 X25 Y15 Z-1" in plain

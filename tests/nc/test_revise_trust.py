@@ -100,7 +100,7 @@ def test_who_takes_an_unproven_model_stands_in_the_program(
     assert f"({MARK} unproven, approved by M. Weber, trial on machine 7)" in Path("out.ngc").read_text(encoding="ascii")
     warnings = json.loads(capsys.readouterr().out)["warnings"]
     assert any("Approved by M. Weber, trial on machine 7" in w for w in warnings)
-    assert "the model of Z was judged with a stated harm margin of 20 um" in warnings
+    assert "the model of Z was judged with a harm margin set by the user, 20 um" in warnings
 
 
 def test_models_along_an_axis(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

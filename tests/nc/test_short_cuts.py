@@ -108,7 +108,7 @@ def test_what_is_given_back_by_the_feed_takes_its_time(line: str, setup: Setup, 
 def test_a_rotary_axis_does_not_turn_by_a_feed_that_would_count_mm(setup: Setup, tmp_path: Path) -> None:
     path = tmp_path / "part.ngc"
     path.write_text(LONG.format("G53 G1 Z-1 A0 F100"), encoding="ascii")
-    with pytest.raises(ProgramError, match=r"line 9: turns a rotary axis at feed rate .* write G53 G0"):
+    with pytest.raises(ProgramError, match=r"line 9: the line turns a rotary axis at feed rate .* write G53 G0"):
         revise(path, tmp_path, Growing(rate=(0.1, 0.1, 0.3), slope=0.0), "coordinates", setup=setup)
 
 

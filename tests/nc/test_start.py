@@ -85,14 +85,14 @@ def test_a_pause_follows_a_forecast_of_its_time() -> None:
 def test_a_state_of_other_models_is_refused() -> None:
     stations = one(lags())
     left = Drift(stations, start.begin_cold(stations, {})).state()
-    with pytest.raises(InputError, match="another model of z_um"):
+    with pytest.raises(InputError, match="the model of z_um is not the one of the last job"):
         start.carry_over(one(lags(size=1.1)), left)
-    with pytest.raises(InputError, match="left the state of Z; this one has models of X"):
+    with pytest.raises(InputError, match="saved the state of Z, but this job has models of X"):
         start.carry_over([Station("X", lags(), shadow=True)], left)
     with pytest.raises(InputError, match="pause"):
         start.carry_over(stations, left, -1.0)
     short = JobState((replace(left.stations[0], memory=(1.0,)),), left.zero_known)
-    with pytest.raises(InputError, match="not complete"):
+    with pytest.raises(InputError, match="is incomplete"):
         start.carry_over(stations, short)
 
 

@@ -93,7 +93,9 @@ def test_a_turn_of_the_table_stays_one(way: str, turn: str, tmp_path: Path) -> N
 
 
 def test_a_turn_from_a_place_that_nobody_knows_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ProgramError, match=r"line 6: turns a rotary axis at feed rate.*position X Y Z by a rapid"):
+    with pytest.raises(
+        ProgramError, match=r"line 6: the line turns a rotary axis at feed rate.*position X Y Z by a rapid"
+    ):
         tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X1 Y1 Z1\nG1 Z0 F100\nM0\nG1 X1 Y1 Z0 A90 F720\nM2\n", setup=TABLE)
 
 
@@ -196,13 +198,13 @@ def test_short_cuts_take_as_long_as_they_did(tmp_path: Path) -> None:
 @pytest.mark.parametrize("stop", ["M0", "M1"])
 def test_a_stop_comes_after_the_move_of_its_line(stop: str, tmp_path: Path) -> None:
     """The operator moves the axes, and nobody knows any more what they carry: their place cannot be named."""
-    with pytest.raises(ProgramError, match="line 4: names the position of X, which is unknown"):
+    with pytest.raises(ProgramError, match="line 4: the position of X before this line is unknown"):
         tried(tmp_path, f"{BEGIN}S1000 M3\nX5 Y5 Z2 F100 G1 {stop}\nG92 X0\nG0 Z5\nM2\n")
 
 
 def test_a_place_behind_a_tool_change_has_no_name(tmp_path: Path) -> None:
     """The changer moves the axes, and nobody knows any more what they carry."""
-    with pytest.raises(ProgramError, match="line 5: names the position of X, which is unknown"):
+    with pytest.raises(ProgramError, match="line 5: the position of X before this line is unknown"):
         tried(tmp_path, f"{BEGIN}S1000 M3\nG0 X5 Y5 Z2\nT1 M6\nG92 X0\nG0 Z5\nM2\n")
 
 

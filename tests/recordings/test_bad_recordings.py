@@ -34,7 +34,7 @@ GOOD = "time_s,t1_C,drift_um\n0,20.5,0\n15,20.6,1\n"
         ("time_s;t1_C\n0;20,5\n5;20,4\n15;20.5\n", ["line 4", "'t1_C'", "'20.5'"]),
         ("time_s;t1_C\n0;20\n15;warm\n", ["line 3", "'t1_C'", "'warm'"]),
         ("time_s,t1_C\n0,20\nlater,21\n", ["line 3", "'time_s'", "'later'"]),
-        ("time_s,t1_C\n0,20\n15,21\n15,22\n15,22\n", ["line 4", "15.0 comes twice", "line 3", "2 rows"]),
+        ("time_s,t1_C\n0,20\n15,21\n15,22\n15,22\n", ["line 4", "15.0 occurs twice", "line 3", "2 rows"]),
         ("time_s,t1_C\n0,20\n\n15,21\n14,22\n", ["line 5", "14.0 is before 15.0", "line 4", "split the file"]),
         ("time_s,t1_C\n0,20\n,21\n", ["line 3", "'time_s'", "time is missing"]),
         ("time,t1_C\n2024-01-01T00:00:00,20\n2023-12-31T00:00:00,21\n", ["line 3", "2023-12-31", "is before"]),
@@ -97,7 +97,7 @@ def test_a_binary_file_named_csv_is_told_as_what_it_is(tmp_path: Path, content: 
     path = tmp_path / "bad.csv"
     path.write_bytes(content)
 
-    with pytest.raises(RecordingError, match=rf"bad\.csv: is .*{says}"):
+    with pytest.raises(RecordingError, match=rf"bad\.csv: the file is .*{says}"):
         read(path)
 
 
@@ -106,7 +106,7 @@ def test_a_damaged_workbook_or_parquet_file_is_told(tmp_path: Path, ending: str)
     path = tmp_path / f"bad.{ending}"
     path.write_text(GOOD)
 
-    with pytest.raises(RecordingError, match=rf"bad\.{ending}: is not a"):
+    with pytest.raises(RecordingError, match=rf"bad\.{ending}: this is not a"):
         read(path)
 
 
@@ -122,13 +122,13 @@ def test_a_missing_file_is_told_with_the_nearest_name(tmp_path: Path) -> None:
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
 
-    with pytest.raises(RecordingError, match=r"folder\.csv: cannot be read: Is a directory"):
+    with pytest.raises(RecordingError, match=r"folder\.csv: the file cannot be read: Is a directory"):
         read(tmp_path / "folder.csv")
 
 
 def test_a_pipe_is_no_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(RecordingError, match=r"pipe\.csv: is a pipe or a device, not a file"):
+    with pytest.raises(RecordingError, match=r"pipe\.csv: this is a pipe or a device, not a file"):
         read(tmp_path / "pipe.csv")
 
 
@@ -232,7 +232,7 @@ def test_a_wrong_encoding_is_told(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"bad\.csv: the heading line is not written in utf-8"):
         read(path, Mapping(read=ReadOptions(encoding="utf-8")))
     path.write_bytes("time_s,t1_C,cycle\n0,20,früh\n".encode("latin-1"))
-    with pytest.raises(RecordingError, match=r"bad\.csv: is not written in utf-8"):
+    with pytest.raises(RecordingError, match=r"bad\.csv: the file is not written in utf-8"):
         read(path, Mapping(read=ReadOptions(encoding="utf-8")))
 
 
@@ -249,7 +249,7 @@ def test_a_damaged_description_of_its_own_is_noted(tmp_path: Path) -> None:
         ([], ["is empty"]),
         ([["time_s", "t1_C"]], ["no rows below"]),
         ([["time_s", "t1_C"], [0, 20], [15, "warm"]], ["row 3", "'t1_C'", "'warm'"]),
-        ([["# remark", None], ["time_s", "t1_C"], [0, 20], [0, 21]], ["row 4", "0.0 comes twice", "row 3"]),
+        ([["# remark", None], ["time_s", "t1_C"], [0, 20], [0, 21]], ["row 4", "0.0 occurs twice", "row 3"]),
     ],
 )
 def test_a_bad_sheet_is_told_with_its_row(tmp_path: Path, rows: list[list[object]], parts: list[str]) -> None:

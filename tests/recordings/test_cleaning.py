@@ -98,7 +98,7 @@ def test_a_probe_is_zeroed_at_an_instant() -> None:
     mended = clean(rows(), [Rezero(("z_um",), at=0.0, to=5.0)])
     assert mended.table["z_um"].tolist() == [5.0 + 2.0 * k for k in range(12)]
     with pytest.raises(
-        InputError, match="z_um has no value before the instant, from which it could continue; give `to`"
+        InputError, match="z_um has no value before or after the given time, so the step there is unknown; give `to`"
     ):
         clean(rows(), [Rezero(("z_um",), at=0.0)])
 
@@ -149,9 +149,9 @@ def test_what_is_not_there_is_refused(step: Step, message: str) -> None:
 def test_steps_that_say_nothing_are_refused() -> None:
     for make, message in (
         (lambda: Cut(("z_um",)), "specify the rows to cut"),
-        (lambda: Shift(("z_um",)), "wrong clock and its correction"),
-        (lambda: Shift(by_s=4.0), "specify the channels with the wrong clock"),
-        (lambda: Rezero(at=4.0), "specify the probe"),
+        (lambda: Shift(("z_um",)), "whose clock is wrong, and the time shift"),
+        (lambda: Shift(by_s=4.0), "specify the channels whose clock is wrong"),
+        (lambda: Rezero(at=4.0), "specify the channel of the probe"),
         (lambda: Swap(("z_um",)), "specify the two"),
         (Resample, "give the interval"),
         (lambda: Resample(("z_um",), every_s=4.0), "no channels"),

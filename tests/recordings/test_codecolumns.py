@@ -80,7 +80,9 @@ def test_what_is_missing_or_wrong_is_said_with_the_file(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"one\.csv: no column is named after E9, such as"):
         read_components([one], ["E9"])
     none = written(tmp_path / "none.csv", "x_laser_0_um", "x_laser_1_um", "x_laser_2_um")
-    with pytest.raises(RecordingError, match=r"none\.csv: no column is named after a component, such as EXX_250_um"):
+    with pytest.raises(
+        RecordingError, match=r"none\.csv: no column is named after an error component, such as EXX_250_um"
+    ):
         read_components([none])
     wrong = written(tmp_path / "wrong.csv", *X[:2], "EXX_200_urad")
     with pytest.raises(UnitError, match=r"'EXX_200_urad' measures angle in urad among displacements"):

@@ -76,7 +76,7 @@ def test_targets_are_what_a_model_can_learn() -> None:
         ),
         (compensated(), "z_residual_um", r"z_residual_um was recorded .*\(residual\): .* as the target, z_um"),
         (compensated(), "z_correction_um", r"z_correction_um was recorded .*\(correction\): .* as the target, z_um"),
-        (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um, which is z_residual_um - z_corr"),
+        (compensated("z_um"), "z_um", "there is z_residual_um, .* add a column z_um = z_residual_um - z_corr"),
         (compensated("z_residual_um"), "z_um", "z_um was measured while z_correction_um was in force"),
         (
             compensated(z_um=np.nan),
@@ -96,7 +96,7 @@ def test_what_is_refused(recording: Recording, target: str, text: str) -> None:
 def test_a_sum_of_the_wrong_sign_is_found() -> None:
     wrong = compensated()
     wrong.table["z_um"] = wrong.table["z_residual_um"] + wrong.table["z_correction_um"]
-    with pytest.raises(RecordingError, match=r"in row \d+ z_um is .* one of them is wrong; name the uncompensated"):
+    with pytest.raises(RecordingError, match=r"in row \d+ z_um is .* they must be equal; name the uncompensated"):
         refuse_compensated([wrong], ["z_um"])
     refuse_compensated([replace(wrong, changed=("z_um: cut",))], ["z_um"])
     refuse_compensated([wrong], ["x_um"])

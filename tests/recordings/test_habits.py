@@ -81,7 +81,7 @@ def test_it_is_the_same_recording(name: str, encoding: str, tmp_path: Path) -> N
 def test_what_was_passed_over_is_told(tmp_path: Path) -> None:
     path = tmp_path / "habit.csv"
     path.write_text(HABITS["preamble and a row of units"], encoding="utf-8")
-    assert read(path).notes[:2] == ("lines 1 to 2 above the headings are passed over", "line 5 holds the units")
+    assert read(path).notes[:2] == ("lines 1 to 2 above the headings are skipped", "line 5 holds the units")
 
 
 def test_the_line_of_the_headings_can_be_stated(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_the_sheet_with_the_table_is_read(writer: Writer, ending: str, tmp_path:
     same(recording)
     assert recording.notes[:3] == (
         "sheet 'data' of 'notes', 'data' is read",
-        "row 1 above the headings is passed over",
+        "row 1 above the headings is skipped",
         "row 3 holds the units",
     )
     writer(path, {"warm": SHEET, "cold": SHEET})
@@ -220,7 +220,7 @@ def test_dates_of_a_sheet(tmp_path: Path) -> None:
 def test_a_sheet_is_bounded(writer: Writer, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"wide.{ending}"
     writer(path, {"data": [*SHEET, [None] * 11_000 + [1.0]]})
-    with pytest.raises(RecordingError, match=r"sheet 'data', row 16: over 10,000 columns .*\[limits\] columns"):
+    with pytest.raises(RecordingError, match=r"sheet 'data', row 16: over 10,000 columns, .*\[limits\] columns"):
         read(path)
 
 

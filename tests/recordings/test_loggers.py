@@ -17,13 +17,13 @@ CP1252, COMMA = "written in cp1252, not in UTF-8", "the decimal sign is a comma"
 
 #: file: its plain CSV, when it begins, what was done
 AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "almemo.csv": ("short", BEGIN, (CP1252, "lines 1 to 3 above the headings are passed over", COMMA)),
+    "almemo.csv": ("short", BEGIN, (CP1252, "lines 1 to 3 above the headings are skipped", COMMA)),
     "benchlink.csv": (
         "full",
         BEGIN,
         (
             "written in UTF-16-LE",
-            "lines 1 to 16 above the headings are passed over",
+            "lines 1 to 16 above the headings are skipped",
             "the dates are month/day/year: '05/27/2024 08:00:00.000' is not a date otherwise",
         ),
     ),
@@ -32,8 +32,8 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "",
         (
             CP1252,
-            "lines 1 to 4 above the headings are passed over",
-            "between the headings and the table line 7 is passed over",
+            "lines 1 to 4 above the headings are skipped",
+            "between the headings and the table line 7 is skipped",
             "line 8 holds the units",
             "'Zeit  1 - Standardmessrate [s]' is taken as the time",
             COMMA,
@@ -43,7 +43,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "gaps",
         BEGIN,
         (
-            "lines 1 to 17 above the headings are passed over",
+            "lines 1 to 17 above the headings are skipped",
             "line 19 holds the units",
             "CH2 [degC]: 'BURNOUT', taken as missing, in 2 of 48 cells: line 27, line 28",
             "CH4 [degC]: 'BURNOUT', taken as missing, in 1 of 48 cells: line 40",
@@ -56,8 +56,8 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         BEGIN,
         (
             CP1252,
-            "lines 1 to 2 above the headings are passed over",
-            "lines 53 to 57 at the end are no rows of the table, and left out",
+            "lines 1 to 2 above the headings are skipped",
+            "lines 53 to 57 at the end are not part of the table, and left out",
             COMMA,
             "T1 [°C]: '---', taken as missing, in 2 of 48 cells: line 12, line 13",
             "T3 [°C]: '---', taken as missing, in 1 of 48 cells: line 25",
@@ -69,17 +69,17 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "full",
         "",
         (
-            "lines 1 to 3 above the headings are passed over",
+            "lines 1 to 3 above the headings are skipped",
             "columns 3, 5, 7, 9, 11 hold the same times as column 1",
         ),
     ),
-    "labview.txt": ("short", "", ("lines 1 to 12 above the headings are passed over", COMMA)),
+    "labview.txt": ("short", "", ("lines 1 to 12 above the headings are skipped", COMMA)),
     "hioki.csv": (
         "gaps",
         "",
         (
             "written in shift_jis, not in UTF-8",
-            "lines 1 to 3 above the headings are passed over",
+            "lines 1 to 3 above the headings are skipped",
             "CH2-1[℃]: 'OVER', taken as missing, in 2 of 48 cells: line 12, line 13",
         ),
     ),
@@ -101,9 +101,9 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "mm",
         "",
         (
-            "lines 1 to 3 above the headings are passed over",
+            "lines 1 to 3 above the headings are skipped",
             "line 6 holds the units",
-            "line 56 at the end is no row of the table, and left out",
+            "line 56 at the end is not part of the table, and left out",
         ),
     ),
     "database.csv": ("full", BEGIN + "+00:00", ("'time' is taken as milliseconds since 1970-01-01 UTC",)),
@@ -122,7 +122,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         BEGIN,
         (
             "sheet 'Messwerte' of 'Deckblatt', 'Messwerte' is read",
-            "row 1 above the headings is passed over",
+            "row 1 above the headings is skipped",
             "row 4 holds the units",
         ),
     ),
@@ -130,7 +130,7 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "libreoffice.ods": (
         "nine",
         BEGIN,
-        ("sheet 'Messung' of 'Messung', 'Notizen' is read", "row 1 above the headings is passed over"),
+        ("sheet 'Messung' of 'Messung', 'Notizen' is read", "row 1 above the headings is skipped"),
     ),
     "libreoffice_de.csv": ("short", BEGIN, (COMMA,)),
     "pandas.csv": (

@@ -85,7 +85,7 @@ def test_a_mapping_that_is_not_there_or_not_text_is_told(tmp_path: Path) -> None
         read_mapping(tmp_path / "none.toml")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"binary\.toml: cannot be read as a mapping"):
+    with pytest.raises(InputError, match=r"binary\.toml: the file cannot be read as a mapping"):
         read_mapping(binary)
 
 

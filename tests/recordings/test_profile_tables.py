@@ -96,7 +96,9 @@ def test_positions_that_were_measured_and_not_commanded(tmp_path: Path) -> None:
     table = long(found).assign(state=np.repeat(range(len(found)), 12))
     table["y_mm"] += 1e-3 * np.random.default_rng(0).normal(size=len(table))
     table.to_csv(tmp_path / "long.csv", index=False)
-    with pytest.raises(RecordingError, match="288 different places in all, but at most 12 in one thermal state: give"):
+    with pytest.raises(
+        RecordingError, match="288 different positions in all, but at most 12 in one thermal state: give"
+    ):
         read(tmp_path / "long.csv", "EYY")
 
 
@@ -157,15 +159,15 @@ def _with_zeros(found: Profiles) -> Profiles:
 
 def test_columns_that_nobody_named_must_suit_the_component(tmp_path: Path) -> None:
     wide(made()).to_csv(tmp_path / "wide.csv", index=False)
-    with pytest.raises(RecordingError, match="columns like 'y_laser_0_um' seem to be of Y, not of EXX; state which"):
+    with pytest.raises(RecordingError, match="columns like 'y_laser_0_um' seem to contain Y, not EXX; if they are"):
         read(tmp_path / "wide.csv", "EXX")
     assert read(tmp_path / "wide.csv", ProfileOptions(target="EXX", columns="y_laser_*")).axis == "X"
     assert read(tmp_path / "wide.csv", "EXY").target == "EXY"
     with pytest.raises(RecordingError, match=r"no column is like y_laser_250_urad"):
         read(tmp_path / "wide.csv", "EAY")
-    with pytest.raises(InputError, match="X0C: spindle drift in X does not depend on a position; name a c"):
+    with pytest.raises(InputError, match="X0C: spindle drift in X does not depend on a position; give an"):
         read(tmp_path / "wide.csv", "X0C")
-    with pytest.raises(InputError, match="laser: it is not the code of a component"):
+    with pytest.raises(InputError, match="laser: it is not the name of an error component"):
         read(tmp_path / "wide.csv", "laser")
     own = ProfileOptions(target="laser", axis="Y", unit="um")
     assert read(tmp_path / "wide.csv", own).target == "laser"
@@ -232,7 +234,7 @@ def test_columns_out_of_order_and_too_few(tmp_path: Path) -> None:
     ("rows", "message"),
     [
         ("0,20,0,1\n0,20,100,1\n0,20,50,1", r"line 4, column 'y_mm': 50 mm follows 100 mm in one thermal state"),
-        ("0,20,0,1\n0,20,50,1\n0,20,50,2", r"line 4, column 'y_mm': 50 mm comes twice in one thermal state, but"),
+        ("0,20,0,1\n0,20,50,1\n0,20,50,2", r"line 4, column 'y_mm': 50 mm occurs twice in one thermal state, but"),
         ("0,20,0,1\n0,20,,1\n0,20,50,2", r"line 3, column 'y_mm': the position is missing"),
         ("0,20,0,1\n0,20,50,1\n9,20,0,2\n9,20,50,2", r"2 positions along Y \(0, 50 mm\)"),
         ("0,20,0,1\n0,20,fifty,1\n0,20,100,2", r"line 3, column 'y_mm': 'fifty' is not a number"),
@@ -252,7 +254,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
     table = long(found)
     path = tmp_path / "long.csv"
     table.assign(other_um=1.0).to_csv(path, index=False)
-    with pytest.raises(RecordingError, match="one column of displacements; there are error_um, other_um: state which"):
+    with pytest.raises(RecordingError, match="one column of displacements; there are error_um, other_um: specify"):
         read(path, "EYY")
     assert "other_um" in [c.name for c in read(path, ProfileOptions(target="EYY", columns="error_um")).states.channels]
     with pytest.raises(InputError, match="no column is called 'errors'; there are t1_C"):
@@ -287,7 +289,7 @@ def test_columns_of_a_long_table(tmp_path: Path) -> None:
         ("[positions]\na = { q = '1 mm' }", r"write the axes' positions"),
         ("[positions]\na = { y = 250 }", r'a\.y = 250: write a position with its unit, such as "250 mm"'),
         ("[positions]\na = { y = '250' }", r"a\.y = '250': write a position with its unit"),
-        ("[positions]\na = { y = '250 degC' }", r"a\.y: unit 'degC' measures temperature, not position"),
+        ("[positions]\na = { y = '250 degC' }", r"a\.y = '250 degC': unit 'degC' measures temperature, not position"),
         ("[positions", "not valid TOML"),
     ],
 )
@@ -305,7 +307,9 @@ def test_places_must_tell_the_own_position_and_be_there(tmp_path: Path) -> None:
     found = made()
     wide(found).to_csv(tmp_path / "wide.csv", index=False)
     places = {f"y_laser_{p:g}_um": {"X": p} for p in found.position}
-    with pytest.raises(InputError, match="column 'y_laser_0_um': its entry does not specify the position of Y"):
+    with pytest.raises(
+        InputError, match=r"column 'y_laser_0_um': its entry in .positions. does not give the position of Y"
+    ):
         read(tmp_path / "wide.csv", ProfileOptions(target="EYY", places=places))
     with pytest.raises(ThermocompError, match="no channel is named 'lost'"):
         read(tmp_path / "wide.csv", ProfileOptions(target="EYY", places={"lost": {"Y": 1.0}}))

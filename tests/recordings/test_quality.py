@@ -108,7 +108,7 @@ def test_several_stuck_stretches_are_counted() -> None:
 
     (found,) = _check(values)
 
-    assert "100 rows, from row 600 (9000 s) to row 699 (10485 s), one of 2 such stretches" in found.text
+    assert "100 rows, from row 600 (9000 s) to row 699 (10485 s), one of 2 such periods" in found.text
 
 
 @settings(deadline=None, max_examples=100)
@@ -149,7 +149,7 @@ def test_a_missing_value_code_is_trouble_and_nothing_else_is_said(code: float, r
     (found,) = _check(values)
 
     assert (found.severity, found.kind) == ("trouble", "missing-value code")
-    assert f"hold {code:g}" in found.text
+    assert f"are {code:g}, a value" in found.text
     assert f"{len(rows)} value" in found.text
     assert f"row {rows[0]} " in found.text
     assert f"missing = [{code:g}]" in found.text
@@ -167,7 +167,7 @@ def test_a_sensor_that_gives_nothing_but_a_code_is_absent(code: float, quantity:
     (found,) = _check(np.full(N, code), quantity)
 
     assert (found.severity, found.kind) == ("trouble", "missing-value code")
-    assert "the sensor is absent" in found.text
+    assert "no sensor is connected" in found.text
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_missing_values_are_counted_and_located() -> None:
     (found,) = _check(values)
 
     assert (found.severity, found.kind) == ("warning", "missing values")
-    assert "101 values of 2000 (5.1%) missing, at most 100 in a row from row 600 (9000 s)" in found.text
+    assert "101 values of 2000 (5.1%) missing, at most 100 consecutively, from row 600 (9000 s)" in found.text
     assert [f.severity for f in _check(half)] == ["trouble"]
     assert [(f.severity, f.text[:19]) for f in _check(np.full(N, np.nan))] == [("trouble", "has no value at all")]
 
@@ -291,7 +291,10 @@ def test_one_cycle_is_told_with_its_reason() -> None:
     once = np.where(TIME < 7500, 3000.0, 0.0)
     still = replace(turning, table=turning.table.assign(n=once)).with_cycles(make_single_cycle(N))
     assert "does not start again" in check(still)[0].text
-    assert "starts has a stop of 300 s before it" in check(turning.with_cycles(make_single_cycle(N)))[0].text
+    assert (
+        "spindle starts follows a standstill of at least 300 s"
+        in check(turning.with_cycles(make_single_cycle(N)))[0].text
+    )
 
 
 def test_a_drift_of_millimetres_is_another_unit() -> None:
@@ -332,7 +335,7 @@ def test_probing_cycles_are_no_trouble() -> None:
     touched = {name: np.where(there, drift + k, np.nan) for k, name in enumerate(("x", "y"))}
     found = check(_recording(quantity="displacement", **touched))
     assert [(f.severity, f.kind, f.channel) for f in found if f.channel] == [("info", "probed", n) for n in "xy"]
-    assert "has 40 values in 2000 rows" in found[-1].text
+    assert "has values in only 40 of 2000 rows" in found[-1].text
     (lone,) = [f for f in _check(np.where(there, drift, np.nan), "displacement") if f.kind == "missing values"]
     assert lone.severity == "trouble"
 

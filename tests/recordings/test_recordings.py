@@ -348,7 +348,7 @@ def test_the_measured_absent_sensor_is_told_and_can_be_marked(shared_data: Path)
 
     assert [(f.channel, f.kind) for f in trouble] == [("chamber_t", "missing-value code")]
     assert "-180" in trouble[0].text
-    assert "sensor is absent" in trouble[0].text
+    assert "no sensor is connected" in trouble[0].text
     assert marked.table["chamber_t"].isna().all()
     assert marked.table["frame_t"].notna().all()
 

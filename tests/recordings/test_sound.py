@@ -49,7 +49,7 @@ def test_a_step_of_a_probe_caps_the_verdict_on_it_alone() -> None:
     result = compare(samples, ["dynamic"], splits.leave_one_cycle_out(samples), robustness=False)
     z, x = result.overall()
     assert z.word != "accepted"
-    assert "small: z_um has trouble (" in z.reason or z.word == "refused"
+    assert "small: data-quality problem in z_um (" in z.reason or z.word == "refused"
     assert x.word == "accepted"
 
 

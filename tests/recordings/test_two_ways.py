@@ -307,7 +307,7 @@ def test_rows_at_the_end_that_are_none_are_left_out(tmp_path: Path, end: str, le
     path.write_text("time_s;t1_C;t2_C\n0;20;21\n10;21;22\n" + end, encoding="utf-8")
     recording = read(path)
     assert len(recording) == 2
-    assert told(recording, "at the end " + ("is no row" if left_out == 1 else "are no rows"))
+    assert told(recording, "at the end " + ("is not part" if left_out == 1 else "are not part"))
 
 
 @pytest.mark.parametrize(
@@ -346,7 +346,7 @@ def test_rows_of_labels_between_headings_and_table_are_passed_over(tmp_path: Pat
     recording = read(path)
     assert recording.table.to_numpy().tolist() == [[20, 21], [21, 22]]
     assert recording.notes[:2] == (
-        "between the headings and the table lines 2, 4 are passed over",
+        "between the headings and the table lines 2, 4 are skipped",
         "line 3 holds the units",
     )
 
@@ -362,7 +362,7 @@ def test_rows_at_the_end_of_a_sheet_are_left_out(tmp_path: Path) -> None:
     ]
     pd.DataFrame(rows).to_excel(path, header=False, index=False)
     recording = read(path)
-    assert (len(recording), told(recording, "rows 4 to 5 at the end are no rows")) == (2, True)
+    assert (len(recording), told(recording, "rows 4 to 5 at the end are not part")) == (2, True)
 
 
 def test_headings_that_come_again_are_passed_over(tmp_path: Path) -> None:
@@ -373,7 +373,7 @@ def test_headings_that_come_again_are_passed_over(tmp_path: Path) -> None:
     path.write_text(path.read_text(encoding="utf-8").replace("warm", "23"), encoding="utf-8")
     recording = read(path)
     assert recording.table["t1_C"].tolist() == [20, 21, 22, 23]
-    assert told(recording, "the headings come again, passed over, in line 4")
+    assert told(recording, "the headings are repeated in line 4; skipped")
 
 
 @pytest.mark.parametrize(

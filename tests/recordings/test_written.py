@@ -59,7 +59,7 @@ def test_writing_keeps_what_is_there_unless_told(tmp_path: Path) -> None:
     path = _csv(tmp_path, "time_s,t1_C\n0,1\n")
     recording = read(path)
 
-    with pytest.raises(InputError, match=r"rec\.csv: exists already"):
+    with pytest.raises(InputError, match=r"rec\.csv: the file exists already"):
         write(recording, path)
     write(recording, path, overwrite=True)
     assert path.read_text() == "time_s,t1_C,cycle\n0.0,1.0,whole test\n"
@@ -100,7 +100,7 @@ def test_writing_leaves_other_files_alone(tmp_path: Path, ending: str, monkeypat
         raise OSError("the disk is full")
 
     monkeypatch.setattr(pd.DataFrame, f"to_{ending}", fail)
-    with pytest.raises(InputError, match=r"out\.(csv|parquet): cannot be written: the disk is full"):
+    with pytest.raises(InputError, match=r"out\.(csv|parquet): the file cannot be written: the disk is full"):
         write(recording, path, overwrite=True)
     assert {p.name for p in tmp_path.iterdir()} == there | {path.name}
     assert path.read_bytes() == whole_one

@@ -134,7 +134,7 @@ def test_without_a_failure_there_is_a_sentence() -> None:
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:
     (whole,) = judged.overall()
-    refused = replace(judged, assessments=(replace(whole, caveat="no honest test"),))
+    refused = replace(judged, assessments=(replace(whole, caveat="not a test on unseen data"),))
     assert '<p class="verdict">z_um: refused' in assessed.render(refused, [recording])
     sound = failing()  # a correction that is held for want of sensors is not accepted
     judged = assessing.assess([watched_model()], [sound], starts=Start())
@@ -197,7 +197,7 @@ def test_the_command_and_python_write_the_same_page(
     first = Path("report.html").read_bytes()
     assert b"<h2>Sensors</h2>" in first
     assert run([*words, "-o", "report.html"]) == 2
-    assert "report.html: exists already" in " ".join(capsys.readouterr().err.split())
+    assert "report.html: the file exists already" in " ".join(capsys.readouterr().err.split())
     assert run([*words, "-o", "model.html"]) in (0, 1)
     assert run([*words, "-o", "failing.csv", "--overwrite"]) == 2
     assert "is also an input" in " ".join(capsys.readouterr().err.split())

@@ -169,7 +169,7 @@ def test_a_creeping_error_ends_at_what_the_model_can_be_wrong_by(step: float) ->
         found, told = adaptation.take(found, directions, k * HOUR, k * step, 0.0)
         assert abs(found.shift(k * HOUR, directions)) <= most
         assert abs(found.shift(k * HOUR, 20.0 * directions)) <= most  # nor later, on a hotter machine
-    assert "whose error can be 15.0 um at most" in told
+    assert "whose error can be at most 15.0 um" in told
     assert abs(found.mean).max() < most
 
 
@@ -246,7 +246,7 @@ def test_a_probing_without_a_usable_reading_or_model_is_refused() -> None:
     assert said.refused["z"].startswith("the reading to which the probing belongs is rejected: ")
     assert not state.learned
     state, said = running.step(state, Reading(1.0, {"t": 20.0, "n": 0.0}), 1.0, {"y": Probing(4.0)})
-    assert said.refused == {"y": "no model drives the correction"}
+    assert said.refused == {"y": "no model computes the correction"}
 
 
 def test_an_axis_of_several_models_learns_an_offset() -> None:

@@ -80,14 +80,14 @@ def test_what_a_fleet_cannot_run_is_refused() -> None:
         (replace(good, unit="urad"), "linear models"),
         (replace(good, support=Support(policy="hold")), "clip"),
         (growing("z_um", 1.0), "linear models"),
-        (replace(lags(), honest_error=ACCEPTED), "single inputs"),
+        (replace(lags(), honest_error=ACCEPTED), "products of inputs"),
     ):
         with pytest.raises(InputError, match=why):
             Fleet(wrong, zeros)  # type: ignore[arg-type]
     for odd in (zeros[0], zeros[:, 1:]):
         with pytest.raises(InputError, match=r"zeros: expected finite values of shape \(n_machines, "):
             Fleet(good, odd)
-    with pytest.raises(InputError, match="zeros: must be finite; remove NaN and infinity"):
+    with pytest.raises(InputError, match="zeros: 48 of 48 values are not finite; remove NaN and infinity"):
         Fleet(good, np.full((2, CHANNELS), np.nan))
     fleet = Fleet(good, zeros)
     for readings, dt in ((zeros, 1.0), (zeros.T, -1.0), (zeros.T, np.nan), (zeros.T, np.inf)):

@@ -53,11 +53,11 @@ def assign_a_sum() -> None:
 @pytest.mark.parametrize(
     ("write", "says"),
     [
-        (use_as_a_condition, "neither true nor false"),
-        (assign_an_unknown, "is not a variable of Kept"),
-        (index_twice, "2 indices for 1 dimensions"),
-        (change_the_kind, "declared as real and as int"),
-        (go_on_without_a_branch, "must follow `when`"),
+        (use_as_a_condition, "no truth value"),
+        (assign_an_unknown, "is not a declared variable of Kept"),
+        (index_twice, "2 indices, expected 1"),
+        (change_the_kind, "declared with two types, real and int"),
+        (go_on_without_a_branch, "must directly follow a `when` block"),
         (assign_a_sum, "cannot be assigned"),
     ],
 )

@@ -171,7 +171,7 @@ def test_what_somebody_orders() -> None:
     _, after, _ = run(order(MACHINE, off, "z", None), 2 * HOUR, 4 * HOUR)
     assert abs(after[0]) <= LIMITS.rate * 10.0 + 1e-12
     for wrong in (Status("active"), Status("fading")):
-        with pytest.raises(InputError, match="cannot be ordered"):
+        with pytest.raises(InputError, match="is not a state that can be ordered"):
             order(MACHINE, state, "z", wrong)
 
 

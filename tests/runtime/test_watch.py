@@ -225,7 +225,7 @@ def test_a_dead_sensor_does_not_freeze_the_correction(watch: Watch, samples: Sam
     rms = np.sqrt(np.mean(np.square(left[900:1200])))
     assert rms < 0.3 * np.sqrt(np.mean(samples.deviations[900:1200, 0] ** 2))
     assert not any(held[:1200])
-    assert "does harm or was not judged" in held[1210]  # two of them
+    assert "is worse than no compensation or was not tested" in held[1210]  # two of them
 
 
 def test_models_of_two_files_are_watched_each_by_its_own(watch: Watch, samples: Samples) -> None:
@@ -282,7 +282,7 @@ def test_a_clock_that_leaps_makes_nothing_fade(watch: Watch, samples: Samples) -
         before = said.corrections["z_um"].offset
     state, said = machine.step(state, Reading(time + 60.0, values), 1e9)
     assert said.rejected
-    assert said.held["z_um"].startswith("no model has driven the correction for 120 s")
+    assert said.held["z_um"].startswith("no model has updated the correction for 120 s")
     assert said.corrections["z_um"].offset == before != 0.0
 
 
@@ -347,8 +347,8 @@ def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Sample
         ({"off": math.nan}, "off"),
         ({"jump": 0.0}, "jump"),
         ({"still": -1.0}, "still"),
-        ({"weights": (1.0,)}, "weights per sensor"),
-        ({"input": 3}, "one sensor per temperature"),
+        ({"weights": (1.0,)}, "has 1 weights; expected"),
+        ({"input": 3}, "expected one per temperature"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(watch: Watch, change: dict[str, Any], says: str) -> None:

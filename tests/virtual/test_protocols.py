@@ -171,7 +171,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         (HEAD + 'segments = [{duration = "1 min", feed = 3}]', "[[segments]] 1, key 'feed' = 3: must be a table"),
         (
             HEAD + 'segments = [{duration = "1 min", stroke = {x = [0, 700]}}]',
-            "[stroke], key 'x' = [0, 700]: must increase",
+            "[stroke], key 'x' = [0, 700]: expected positions that increase",
         ),
         (HEAD + 'segments = [{duration = "1 min", loads = {tip = 3}}]', "no load 'tip'; the nearest are tool_tip"),
         (HEAD + 'order = "random"\nsegments = [{duration = "1 min"}]', "key 'order' = 'random': Input should be"),
@@ -181,7 +181,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             "key 'climate' = 'tropic': there is no climate 'tropic'; the nearest are workshop",
         ),
         (BODY + "climate = {meen = 3}", "[climate], key 'meen' = 3: there is no key 'meen'; the nearest are mean"),
-        (BODY + 'climate = {memory = "0 s"}', "[climate], key 'memory' = '0 s': must be positive"),
+        (BODY + 'climate = {memory = "0 s"}', "[climate], key 'memory' = '0 s': expected a positive time"),
         (BODY + "climate = 20", "key 'climate' = 20: must be a table"),
         (
             BODY + 'places = ["hosing"]',
@@ -192,7 +192,10 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             "'shaft' is on a rotating part: its temperature can only be calculated, with perfect = true",
         ),
         (BODY + 'probes = ["w"]', "key 'probes' = ['w']: there is no probe 'w'; there are x1"),
-        (BODY + 'touch = {every = "0 s", points = {a = [0, 0, 0]}}', "[touch], key 'every' = '0 s': must be positive"),
+        (
+            BODY + 'touch = {every = "0 s", points = {a = [0, 0, 0]}}',
+            "[touch], key 'every' = '0 s': expected a positive interval",
+        ),
         (BODY + 'touch = {every = "1 h", points = {a = [0, 0]}}', "[points], key 'a' = [0, 0]: has too few values"),
         (
             BODY + 'touch = {every = "1 h", points = {a = [0, 0, 900]}}',
@@ -204,15 +207,18 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             "[[faults]] 1, key 'start' = '2 h': 7200 s: must be from 0 to the end of the test, 60 s",
         ),
         (HEAD + 'segments = [{duration = "10000000 h"}]', "give 3.6e+09 rows; at most 10,000,000"),
-        (BODY + "copies = 1000000", "key 'copies' = 1000000: must be from 1 to 10000"),
-        (HEAD + 'duration = "1 min"\nrepeat = 1000000\nsegments = [{}]', "must be from 1 to 10000"),
+        (BODY + "copies = 1000000", "key 'copies' = 1000000: expected 1 to 10000 copies"),
+        (HEAD + 'duration = "1 min"\nrepeat = 1000000\nsegments = [{}]', "expected 1 to 10000 repeats"),
         (HEAD + 'segments = [{duration = "1 min", speed = {between = [0, 3000], step = 1e-6}}]', "use a larger step"),
         (HEAD + 'segments = [{duration = "1 min", powered = "no"}]', "must be true or false, without quotes"),
         (BODY + "perfect = 1", "key 'perfect' = 1: must be true or false"),
-        (HEAD + 'segments = [{duration = "1 min", speed = true}]', "must not be true or false"),
-        (HEAD + 'segments = [{duration = "1 min", speed = "1000"}]', "write a number without quotes"),
+        (HEAD + 'segments = [{duration = "1 min", speed = true}]', "must be a value other than true and false"),
+        (HEAD + 'segments = [{duration = "1 min", speed = "1000"}]', "write the number without quotes"),
         (BODY + "climate = {mean = 1e6}", "1e+06 degC: must be from -30 to 60"),
-        (BODY + 'touch = {every = "1 h", noise = -3, points = {a = [0, 0, 0]}}', "'noise' = -3: must not be negative"),
+        (
+            BODY + 'touch = {every = "1 h", noise = -3, points = {a = [0, 0, 0]}}',
+            "'noise' = -3: expected at least 0 um",
+        ),
         (
             BODY + '[[faults]]\nchannel = "air"\nkind = "lost"\nstart = "30 s"',
             "[[faults]] 1, key 'channel' = 'air': there",
@@ -226,7 +232,7 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
             "[[tests]] 2, key 'machine' = 'tool': there is no key 'machine'",
         ),
         (BODY + '[[tests]]\nname = "a"\n[[tests]]\nname = "a"', "two tests are named 'mine-a'"),
-        (BODY + "tests = 3", "key 'tests' = 3: must be tables"),
+        (BODY + "tests = 3", "key 'tests' = 3: must be a list of tables"),
         (BODY + "tests = []", "key 'tests' = []: an experiment needs at least one test"),
     ],
 )

@@ -66,7 +66,7 @@ def test_what_is_there_is_not_written_over(
     protocol.write_text(PROTOCOL + "copies = 2\n", encoding="utf-8")
     (tmp_path / "rec-2.csv").touch()
     assert run(["simulate", str(protocol), "-o", str(output)]) == 2
-    assert "rec-2.csv: exists already" in " ".join(capsys.readouterr().err.split())
+    assert "rec-2.csv: the file exists already" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_wrong_protocol_is_told_to_the_key(

@@ -91,14 +91,14 @@ def test_a_refused_model_is_written_with_its_refusal(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--component", "EXX"], "seem to be of Y, not of EXX"),
+        (["--component", "EXX"], "seem to contain Y, not EXX"),
         (["--component", "EAY"], "no column is like y_laser_250_urad"),
-        (["--component", "E"], "E: it is not the code of a component; name a component such as EYY"),
+        (["--component", "E"], "E: it is not the name of an error component; give an error component such as EYY"),
         (["--component", "EYY", "--columns", "x_*"], "no column is called 'x_*'"),
         (["--component", "EYY", "--model", "gp"], "gp cannot be stored as coefficients"),
         (["--component", "EYY", "--model", "magic"], "magic"),
-        (["--component", "EYY", "--reference", "99"], "no reference state [99]; there are 0 to 71"),
-        (["--component", "EYY", "--slopes", "12"], "12 factors cannot be fitted to 11 positions"),
+        (["--component", "EYY", "--reference", "99"], "reference state [99]: expected numbers from 0 to 71"),
+        (["--component", "EYY", "--slopes", "12"], "12 coefficients cannot be fitted to 11 positions"),
         (["--component", "EYY", "--inputs", "t9_C"], "no channel is named 't9_C'"),
         (["--component", "EYY", "--positions", "none.toml"], "none.toml: no such file of positions"),
         (["--component", "EYY", "--leave-one-file-out"], "needs at least two recordings"),

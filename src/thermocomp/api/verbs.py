@@ -314,7 +314,7 @@ def assess(
       model       block  rms  none_rms   verdict
     0   ols  all cycles  9.3      77.5  unproven
     >>> print(found.to_frame()["reason"][0])
-    judged on 2 units, at least 3 are needed; record 1 more thermal cycle, at other speeds or on other days
+    judged on only 2 of 3 required cycles or files; record 1 more thermal cycle, at other speeds or on other days
     """
     models = models_of(model)
     listener, tests = Listener(progress), recordings_of(recordings, mapping)

@@ -15,7 +15,7 @@ def alone(path: Path) -> Iterator[None]:
     try:
         lock = os.open(beside, os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as e:
-        raise InputError(f"{path}: cannot be used: {e}") from e
+        raise InputError(f"{path}: the file cannot be used: {e}") from e
     try:
         try:
             import fcntl  # not on Windows

@@ -71,8 +71,8 @@ class Ticking(ErrorModel):
         known = np.asarray(deviation, dtype=np.float64)
         if zero.shape != (len(self.inputs),) or given.shape[-1:] != zero.shape:
             raise InputError(
-                f"start of the model of {self.target}: expected {len(self.inputs)} inputs and {len(self.inputs)} "
-                "reference values"
+                f"start of the model of {self.target}: expected {len(self.inputs)} inputs and as many reference "
+                f"values, found arrays of shape {given.shape} and {zero.shape}"
             )
         if not (np.isfinite(zero).all() and np.isfinite(given).all() and np.isfinite(known).all()):
             raise InputError(
@@ -129,15 +129,15 @@ class Autoregressive(Ticking):
         if len(self.b) != len(self.inputs) or not self.b or len({len(b) for b in self.b}) != 1 or not self.b[0]:
             raise SettingError(
                 f"{owner}: expected coefficients b_0 .. b_m for each of {len(self.inputs)} inputs, at least one and "
-                "the same number for each"
+                f"the same number for each; found {[len(b) for b in self.b]}"
             )
         check_count(owner, ORDER, past_deviations=self.a, past_inputs=self.b[0][1:])
         check_finite(owner, a=self.a, b=self.b, intercept=self.intercept)
         largest = find_largest_root(self.a)
         if not largest < 1:
             raise SettingError(
-                f"{owner}: its free run does not decay: the largest root of its polynomial is {largest:.6g}, "
-                "expected < 1"
+                f"{owner}: its free run does not decay: the largest root of its polynomial has the magnitude "
+                f"{largest:.6g}, expected < 1"
             )
         if not 1.0 - sum(self.a) > SETTLES:
             raise SettingError(f"{owner}: its free run has no steady state: its coefficients a add up to 1")
@@ -202,7 +202,7 @@ class AutoregressiveNet(Ticking):
         if not self.inputs or not n_inputs == wanted == len(self.input_scaling.gain):
             raise SettingError(
                 f"{owner}: k = {self.k}, m = {self.m} and {len(self.inputs)} inputs need a net of {wanted} inputs; "
-                f"found {n_inputs}, and scaling of {len(self.input_scaling.gain)}"
+                f"found {n_inputs}, and scaling for {len(self.input_scaling.gain)}"
             )
         if n_outputs != 1 or len(self.output_scaling.gain) != 1:
             raise SettingError(f"{owner}: expected one output, found {n_outputs}")

@@ -62,9 +62,9 @@ class Band:
         check_between("band", 0.0, WIDEST, **{"half-width": self.floor * max(self.running, self.stopped)})
         check_between("band", CONFORMAL if self.basis == "conformal" else 2, COEFFICIENT, cycles=self.cycles)
         if min(self.speeds, default=0) < 0:
-            raise SettingError("band: an input index must not be negative")
+            raise SettingError(f"band: input index {min(self.speeds)} in speeds: must not be negative")
         if len(set(self.speeds)) < len(self.speeds):
-            raise SettingError("band: an input index occurs twice in speeds")
+            raise SettingError(f"band: an input index occurs twice in speeds, {list(self.speeds)}")
 
     @property
     def words(self) -> str:

@@ -59,8 +59,8 @@ def _parts(model: ErrorModel) -> list[Node]:
             case several:
                 names = ", ".join(model.inputs[k].name for k in several)
                 raise InputError(
-                    f"model of {model.target}: a term depends on several inputs ({names}), so its deviation has no "
-                    "contribution of each input"
+                    f"model of {model.target}: a term depends on several inputs ({names}), so its deviation cannot be "
+                    "divided among the inputs"
                 )
     return [Sum(tuple(terms)) for terms in parts.values()]
 
@@ -75,7 +75,7 @@ def gains(model: ErrorModel, step: float) -> list[Gain]:
     """
     model = _paced(model)
     if not step > 0:
-        raise InputError(f"step {step}: the time between two rows must be more than 0 s")
+        raise InputError(f"step {step}: the time between two rows [s] must be positive")
     direct, weights = model.read_out
     owners, bank = _owners(model), model.bank
     rates = bank.rates.copy()

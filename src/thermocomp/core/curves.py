@@ -46,8 +46,9 @@ class Curve:
                 f"{self.kind} curve has {len(self.x)} x values and {len(self.y)} y values: expected at least one y "
                 f"value{more}"
             )
-        if any(not a < b for a, b in pairwise(self.x)):
-            raise SettingError(f"{self.kind} curve: x must increase strictly")
+        for a, b in pairwise(self.x):
+            if not a < b:
+                raise SettingError(f"{self.kind} curve: x must increase strictly, but {b:g} follows {a:g}")
         if not np.isfinite(self.pieces[2]).all():
             raise SettingError(
                 f"{self.kind} curve: two x values are too close together: the slope between them is not finite"

@@ -303,7 +303,7 @@ def format_node(node: Node) -> str:  # noqa: PLR0911, PLR0912 - a case for every
             return f"{format_node(of)}(t-{ticks})" if ticks else f"{format_node(of)}(t)"
         case Recurrence(tick, interval):
             return f"{format_node(tick)}; t in steps of {interval:g} s"
-    raise InputError(f"{node!r} is not part of an expression")
+    raise InputError(f"{node!r} cannot be printed: {type(node).__name__} is not a node of thermocomp.core.expression")
 
 
 def _sum(terms: Sequence[Node]) -> str:

@@ -51,16 +51,16 @@ class Runs:
 
     def __post_init__(self) -> None:
         if self.stride < 1:
-            raise SettingError(f"fingerprints: a stride of {self.stride} rows must be 1 or more")
+            raise SettingError(f"fingerprints: stride of {self.stride} rows: must be 1 or more")
         if not self.marks:
-            raise SettingError("fingerprints: expected fingerprints of at least one target")
+            raise SettingError("fingerprints: there are none; expected those of at least one target")
         rows = unpack_marks(self.rows)
         if not (np.diff(rows.astype(np.int64)) > 0).all():
-            raise SettingError("fingerprints: their rows must increase")
+            raise SettingError(f"fingerprints: their row numbers must increase, found {rows.tolist()[:10]} ...")
         for name, text in (("moving", self.moving), *self.marks.items()):
             if (n := len(unpack_marks(text))) != len(rows):
                 raise SettingError(
-                    f"fingerprints: {n} values of {name} for {len(rows)} rows; their numbers must be equal"
+                    f"fingerprints: {n} values of {name} for {len(rows)} rows; expected one value per row"
                 )
 
 
@@ -87,19 +87,22 @@ class Prints:
 
     def __post_init__(self) -> None:
         if not 0 < self.interval < np.inf:
-            raise SettingError(f"fingerprints: an interval of {self.interval} s between rows must be a positive number")
+            raise SettingError(f"fingerprints: interval of {self.interval} s between rows: must be positive and finite")
         ends = [row for stretch in self.learned for row in stretch]
         if not ends or ends != sorted(ends) or ends[0] < 0 or any(a == b for a, b in self.learned):
-            raise SettingError(f"fingerprints: {self.learned} are not consecutive sections of rows")
+            raise SettingError(
+                f"fingerprints: training rows {self.learned}: expected sections (first, end) in increasing order"
+            )
         for name, step in self.steps.items():
             if not 0 < step < np.inf:
-                raise SettingError(f"fingerprints of {name}: a resolution of {step} must be a positive number")
+                raise SettingError(f"fingerprints of {name}: resolution {step}: must be positive and finite")
         for run in self.runs:
             if list(run.marks) != list(self.steps):
                 raise SettingError(
-                    f"fingerprints of {', '.join(run.marks)}: expected fingerprints of {', '.join(self.steps)}"
+                    f"fingerprints: a run has those of {', '.join(run.marks)}; expected those of "
+                    f"{', '.join(self.steps)}"
                 )
             if (rows := unpack_marks(run.rows)).size and rows[-1] >= ends[-1]:
                 raise SettingError(
-                    f"fingerprints: a run begins at row {rows[-1]}, but only {ends[-1]} rows were recorded"
+                    f"fingerprints: a run begins at row {rows[-1]}, but the training rows end at row {ends[-1]}"
                 )

@@ -55,7 +55,10 @@ class Input:
             )
         check_finite(f"input {self.name}", RANGE, reference=self.reference, low=self.low, high=self.high)
         if not self.low <= self.high:
-            raise SettingError(f"input {self.name}: trained range [{self.low}, {self.high}] is empty")
+            raise SettingError(
+                f"input {self.name}: trained range [{self.low}, {self.high}]: the first value must not exceed "
+                "the second"
+            )
 
 
 @dataclass(frozen=True)

@@ -59,13 +59,19 @@ class JointSupport:
         positive = {"scale": self.scale, "tolerances": self.tolerances, "limit": self.limit}
         check_between("joint support", LEAST, COEFFICIENT, **positive)
         if len(self.scale) != len(self.columns) or any(len(p) != len(self.columns) for p in self.points):
-            raise SettingError("joint support: expected a scale, and a number in each point, for every column")
+            raise SettingError(
+                f"joint support: {len(self.columns)} columns, {len(self.scale)} scales and points of "
+                f"{sorted({len(p) for p in self.points})} numbers; expected one of each per column"
+            )
         if not len(self.speeds) == len(self.levels) == len(self.tolerances) or not all(self.levels):
-            raise SettingError("joint support: expected levels and a tolerance for every speed")
+            raise SettingError(
+                f"joint support: {len(self.speeds)} speeds, {len(self.levels)} lists of levels and "
+                f"{len(self.tolerances)} tolerances; expected at least one level and one tolerance for every speed"
+            )
         if self.columns and not self.points:
-            raise SettingError("joint support: expected at least one point")
-        if min([*self.columns, *self.speeds], default=0) < 0:
-            raise SettingError("joint support: a column or speed index must not be negative")
+            raise SettingError(f"joint support: {len(self.columns)} columns but no point; expected at least one point")
+        if (least := min([*self.columns, *self.speeds], default=0)) < 0:
+            raise SettingError(f"joint support: input index {least} in columns or speeds: must not be negative")
 
     @property
     def n_inputs(self) -> int:

@@ -272,7 +272,9 @@ class _Builder:
             case e.Recurrence(tick, interval):
                 inputs = [self.form(leaf) for leaf in Clock(tick, interval).leaves]
                 return self._value("recurrence", *inputs, node=node)
-        raise InputError(f"{node!r} cannot be compiled")
+        raise InputError(
+            f"{node!r} cannot be evaluated: {type(node).__name__} is not a node of thermocomp.core.expression"
+        )
 
     def _value(
         self,

@@ -32,8 +32,8 @@ class Learned:
     largest: float
 
     def __post_init__(self) -> None:
-        check_finite("what was learned", mean=self.mean, last=self.last)
-        check_between("what was learned", 0.0, COEFFICIENT, noise=self.noise, largest=self.largest)
+        check_finite("deviation in the training data", mean=self.mean, last=self.last)
+        check_between("deviation in the training data", 0.0, COEFFICIENT, noise=self.noise, largest=self.largest)
 
 
 def probe_noise(y: FloatArray) -> float:

@@ -71,8 +71,9 @@ class LinearDynamic(ErrorModel):
                 f"{owner}: {len(self.lag_signals)} lag signals, {len(self.time_constants)} time constants and "
                 f"{len(self.lagged)} lag coefficients; their numbers must be equal"
             )
-        if any(not 0 <= i < len(self.signals) for i in self.lag_signals):
-            raise SettingError(f"{owner}: the signal index of a lag is beyond the {len(self.signals)} signals")
+        for k, i in enumerate(self.lag_signals):
+            if not 0 <= i < len(self.signals):
+                raise SettingError(f"{owner}: lag {k}: signal index {i}: expected 0 to {len(self.signals) - 1}")
         check_count(owner, ENTRIES, signals=self.signals, lags=self.lagged)
         check_between(owner, LEAST, GAP, time_constants=self.time_constants)
         check_finite(owner, direct=self.direct, lagged=self.lagged, intercept=self.intercept)

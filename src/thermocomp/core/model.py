@@ -101,9 +101,13 @@ class ErrorModel(Gated, ModelFamily):
         if len(set(names)) != len(names):
             raise SettingError(f"{owner}: an input is named twice in {names}")
         if self.joint is not None and self.joint.n_inputs > len(names):
-            raise SettingError(f"{owner}: its joint support has more inputs than the model, which has {len(names)}")
+            raise SettingError(
+                f"{owner}: joint support for {self.joint.n_inputs} inputs, but the model has {len(names)}"
+            )
         if self.band is not None and max(self.band.speeds, default=-1) >= len(names):
-            raise SettingError(f"{owner}: its band has more inputs than the model, which has {len(names)}")
+            raise SettingError(
+                f"{owner}: its band uses input index {max(self.band.speeds)}: expected 0 to {len(names) - 1}"
+            )
         self._check()
 
     def __getstate__(self) -> dict[str, object]:
@@ -130,7 +134,10 @@ class ErrorModel(Gated, ModelFamily):
         else:
             zero = np.asarray(reference, dtype=np.float64)
             if zero.shape != (len(self.inputs),) or not np.isfinite(zero).all():
-                raise InputError(f"reference of the model of {self.target}: expected {len(self.inputs)} finite numbers")
+                raise InputError(
+                    f"reference of the model of {self.target}: expected {len(self.inputs)} finite numbers, found "
+                    f"{zero.tolist()}"
+                )
         return State(zero, None, np.zeros(()), np.zeros(len(self.inputs), dtype=np.bool_))
 
     def step(self, state: State, inputs: FloatArray, dt: float) -> tuple[State, FloatArray]:

@@ -100,9 +100,15 @@ class Perceptron:
                 "one node"
             )
         if any(len(w) != n_inputs for w in self.hidden_weights):
-            raise SettingError(f"net: every hidden node needs {n_inputs} weights, one per input")
+            raise SettingError(
+                f"net: expected {n_inputs} weights per hidden node, one per input; found "
+                f"{sorted({len(w) for w in self.hidden_weights})}"
+            )
         if len(self.output_weights) != n_outputs or any(len(w) != n_hidden for w in self.output_weights):
-            raise SettingError(f"net: each of {n_outputs} outputs needs {n_hidden} weights, one per hidden node")
+            raise SettingError(
+                f"net: expected {n_hidden} weights for each of {n_outputs} outputs, one per hidden node; found "
+                f"{[len(w) for w in self.output_weights]}"
+            )
         for layer in (self.hidden, self.output):
             if layer not in _FUNCTIONS:
                 raise SettingError(

@@ -17,11 +17,13 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
     for path in paths:
         place = find_place(path)
         if any(place.exists() and other.exists() and place.samefile(other) for other in inputs):
-            raise InputError(f"{path}: is also an input; choose another name")
+            raise InputError(f"{path}: this file is also an input; choose another name")
         if place.exists() and not overwrite:
-            raise InputError(f"{path}: exists already; {OTHERWISE}")
+            raise InputError(f"{path}: the file exists already; {OTHERWISE}")
         if ending and path.suffix.lower() != ending:
-            raise InputError(f"{path}: the file is written as {ending[1:]}; name it {path.with_suffix(ending)}")
+            raise InputError(
+                f"{path}: the file is written in the format {ending[1:]}; name it {path.with_suffix(ending)}"
+            )
 
 
 def find_place(target: Path) -> Path:
@@ -37,12 +39,12 @@ def find_place(target: Path) -> Path:
     if not folder.is_dir():
         raise InputError(f"{target}: there is no folder {folder}; create it first")
     if place.is_dir():
-        raise InputError(f"{target}: is a folder; name a file")
+        raise InputError(f"{target}: this is a folder; name a file")
     if place.exists():
         if not place.is_file():
-            raise InputError(f"{target}: is a pipe or a device, not a file; choose another name")
+            raise InputError(f"{target}: this is a pipe or a device, not a file; choose another name")
         if not os.access(place, os.W_OK):
-            raise InputError(f"{target}: is read-only; choose another name, or make it writable")
+            raise InputError(f"{target}: the file is read-only; choose another name, or make it writable")
     return place
 
 
@@ -50,4 +52,4 @@ def cannot_be_written(target: Path, error: OSError) -> InputError:
     """Return the error for a file that cannot be written, with the reason given by the system."""
     hint = f"; you need permission to create files in its folder {target.parent}" if error.errno in _NOT_ALLOWED else ""
     why = os.strerror(error.errno) if error.errno else error
-    return InputError(f"{target}: cannot be written: {why}{hint}; an existing file is unchanged")
+    return InputError(f"{target}: the file cannot be written: {why}{hint}; an existing file is unchanged")

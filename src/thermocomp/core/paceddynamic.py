@@ -106,26 +106,29 @@ class PacedDynamic(ErrorModel):
 
     def _check(self) -> None:
         owner, temperatures, states = f"model of {self.target}", self.temperatures, self.states
-        wrong = [t.input for t in temperatures if len(t.lagged) != len(self.time_constants)]
+        wrong = [t for t in temperatures if len(t.lagged) != len(self.time_constants)]
         if wrong:
             raise SettingError(
-                f"{owner}: input {wrong[0]}: expected {len(self.time_constants)} coefficients in lagged, one per lag"
+                f"{owner}: lagged coefficients of input {wrong[0].input}: expected {len(self.time_constants)}, one per "
+                f"lag; found {len(wrong[0].lagged)}"
             )
-        if any(not 0 <= k < len(self.inputs) for k in [t.input for t in temperatures] + [s.input for s in states]):
-            raise SettingError(
-                f"{owner}: the input index of a temperature or a speed state is beyond the {len(self.inputs)} inputs"
-            )
+        named = [(f"temperature {k}", t.input) for k, t in enumerate(temperatures)]
+        named += [(f"speed state {k}", s.input) for k, s in enumerate(states)]
+        for what, index in named:
+            if not 0 <= index < len(self.inputs):
+                raise SettingError(f"{owner}: {what}: input index {index}: expected 0 to {len(self.inputs) - 1}")
         slower = [s for s in states if s.running > s.stopped]
         if slower:
             raise SettingError(
-                f"{owner}: a speed state has the time constant {slower[0].running:g} s with the spindle running and "
-                f"{slower[0].stopped:g} s with it stopped: the first must not be longer than the second"
+                f"{owner}: speed state {states.index(slower[0])}: its time constant is {slower[0].running:g} s with "
+                f"the spindle running and {slower[0].stopped:g} s with it stopped; the first must not be longer"
             )
         check_count(owner, ENTRIES, lags=range(len(temperatures) * len(self.time_constants)), states=states)
         parts = len(temperatures) * (1 + len(self.time_constants)) + len(states)
-        if any(len(row) != parts for row in self.spread):
+        if wrong_rows := [len(row) for row in self.spread if len(row) != parts]:
             raise SettingError(
-                f"{owner}: expected {parts} numbers in each row of spread, one per temperature, lag and speed state"
+                f"{owner}: a row of spread has {wrong_rows[0]} numbers; expected {parts}: one for each temperature, "
+                "each of its lags and each speed state"
             )
         check_count(owner, ENTRIES, spread=[w for row in self.spread for w in row])
         check_between(owner, LEAST, RANGE, top_speed=self.top_speed)

@@ -31,8 +31,8 @@ def find_plugins(group: Group, report: Callable[[str], object] = lambda _: None)
             report(f"{describe_plugin(entry)} is skipped: the name {entry.name} is already used by {first.value}")
     if not any(entry.value.startswith("thermocomp.") for entry in found.values()):
         report(
-            f"no {group} of thermocomp itself are installed: the installation is older than the code; reinstall "
-            "thermocomp"
+            f"no {group} of thermocomp itself are installed: the installation is older than the source files; "
+            "reinstall thermocomp"
         )
     return found
 

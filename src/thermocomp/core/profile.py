@@ -57,16 +57,21 @@ class PolynomialProfile:
     def __post_init__(self) -> None:
         if len(self.exponents) != len(self.coefficients):
             raise SettingError(f"profile: {len(self.exponents)} terms but {len(self.coefficients)} coefficients")
-        if any(len(term) != 3 or not 0 <= min(term) <= max(term) <= EXPONENT for term in self.exponents):
-            raise SettingError(f"profile: a term needs three exponents from 0 to {EXPONENT}")
+        for term in self.exponents:
+            if len(term) != 3 or not 0 <= min(term) <= max(term) <= EXPONENT:
+                raise SettingError(f"profile: exponents {list(term)}: expected three from 0 to {EXPONENT}")
         check_count("profile", NODES, terms=self.exponents)
         check_between("profile", LEAST, POSITION, scale=self.scale)
         check_finite("profile", coefficients=self.coefficients)
         check_finite("profile", POSITION, centre=self.centre, low=self.low, high=self.high)
         _check_range(self.low, self.high)
         corner = np.abs([self.low, self.high] - np.array(self.centre)).max(axis=0) / self.scale
-        if any(np.dot(term, np.log10(np.maximum(corner, 1.0))) > POWER_OF_TEN for term in self.exponents):
-            raise SettingError("profile: a term overflows at the ends of the range: check centre and scale")
+        for term in self.exponents:
+            if np.dot(term, np.log10(np.maximum(corner, 1.0))) > POWER_OF_TEN:
+                raise SettingError(
+                    f"profile: the term of exponents {list(term)} overflows at an end of the range: check centre and "
+                    "scale"
+                )
 
     @cached_property
     def _axes(self) -> tuple[int, ...]:
@@ -155,8 +160,9 @@ class SplineProfile:
                 f"profile: {len(self.knots)} knots for {len(self.pieces)} pieces; expected one knot more than pieces, "
                 "and at least one piece"
             )
-        if any(not b > a for a, b in zip(self.knots, self.knots[1:], strict=False)):
-            raise SettingError("profile: knots must increase")
+        for a, b in zip(self.knots, self.knots[1:], strict=False):
+            if not b > a:
+                raise SettingError(f"profile: knots must increase, but {b:g} mm follows {a:g} mm")
         check_finite("profile", POSITION, knots=self.knots)
         check_finite("profile", pieces=self.pieces)
 
@@ -219,4 +225,4 @@ def _cubic(c: Sequence[float] | FloatArray, u: Numbers) -> Numbers:
 
 def _check_range(low: Vector, high: Vector) -> None:
     if not all(a <= b for a, b in zip(low, high, strict=True)):
-        raise SettingError(f"profile: range from {low} to {high} mm is empty")
+        raise SettingError(f"profile: range from {low} to {high} mm: the lower end must not exceed the upper end")

@@ -26,5 +26,5 @@ def explain_unfit(text: str, longest: int = 200) -> str:
     if len(text) > longest:
         return f"{text[:40]!a}... has {len(text):,} characters; at most {longest:,} are allowed"
     if not text.isprintable():
-        return f"{text[:40]!a} has characters that cannot be printed"
+        return f"{text[:40]!a} contains non-printable characters"
     return ""

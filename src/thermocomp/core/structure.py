@@ -46,7 +46,7 @@ class Structure:
             if self.axes.count(name) > 1:
                 raise SettingError(f"axis {name} occurs twice")
         if not self.axes:
-            raise SettingError("has no axis; name at least one")
+            raise SettingError("the structure has no axis; name at least one")
 
     @classmethod
     def parse(cls, code: str) -> "Structure":

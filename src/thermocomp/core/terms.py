@@ -46,7 +46,7 @@ class Variable:
         check_count(f"variable {self.name}", INPUTS, weights=self.weights)
         check_finite(f"variable {self.name}", weights=[w for _, w in self.weights])
         if not self.weights:
-            raise SettingError(f"variable {self.name}: has no input")
+            raise SettingError(f"variable {self.name} has no input")
 
     @classmethod
     def single(cls, name: str, index: int) -> "Variable":
@@ -65,8 +65,9 @@ class Variable:
 
     def check_inputs(self, count: int) -> None:
         """Raise `SettingError` if the variable refers to an input beyond `count`."""
-        if any(not 0 <= i < count for i, _ in self.weights):
-            raise SettingError(f"variable {self.name}: refers to an input beyond the {count} given")
+        for i, _ in self.weights:
+            if not 0 <= i < count:
+                raise SettingError(f"variable {self.name}: input index {i}: expected 0 to {count - 1}")
 
     def expression(self, change: Sequence[Node]) -> Node:
         """Return the variable as a node of an expression."""
@@ -96,7 +97,9 @@ class TermTable:
         for t in self.terms:
             check_count("term", DEGREE, factors=t)
             if not t or any(not 0 <= i < len(self.variables) for i in t):
-                raise SettingError(f"term {t}: refers to a variable beyond the {len(self.variables)} given")
+                raise SettingError(
+                    f"term {t}: expected at least one variable index, from 0 to {len(self.variables) - 1}"
+                )
 
     @cached_property
     def _mixing(self) -> FloatArray | None:

@@ -121,7 +121,10 @@ class Ticker:
         clocks = memory[..., 0]
         first = float(clocks.flat[0]) if clocks.size else 0.0
         if (clocks != first).any():
-            raise InputError("the runs of a batch must have been started at the same time")
+            raise InputError(
+                f"the runs of a batch must have started at the same time; {first:g} and "
+                f"{clocks[clocks != first][0]:g} s have passed since their last clock ticks"
+            )
         return first
 
 

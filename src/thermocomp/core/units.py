@@ -241,5 +241,5 @@ def read_with_unit(text: object, quantity: str) -> float | None:
     known = find_unit(found[2], quantity)
     value = known.scale * float(found[1]) + known.shift
     if not math.isfinite(value):
-        raise UnitError("is not a finite number")
+        raise UnitError("the value is not a finite number")
     return value

@@ -51,9 +51,7 @@ class Validity:
 
     def __post_init__(self) -> None:
         if not 0 <= self.independent <= self.units:
-            raise SettingError(
-                f"validity: {self.independent} of {self.units} units are independent; expected 0 to {self.units}"
-            )
+            raise SettingError(f"validity: independent = {self.independent}: expected 0 to units = {self.units}")
         check_between("validity", 0, COEFFICIENT, nearest=self.nearest or 0.0, days=self.days, hours=self.hours)
         check_finite("validity", speeds=self.speeds, ambient=self.ambient or (), start=self.start or ())
         if self.ambient_channel:

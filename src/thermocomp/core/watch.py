@@ -108,15 +108,23 @@ class Watch:
             raise SettingError(f"watch: an input is named twice in {names}")
         heat = [k for k, i in enumerate(self.inputs) if i.quantity == "temperature"]
         if [s.input for s in self.sensors] != heat:
-            raise SettingError("watch: expected one sensor per temperature, in the order of the inputs")
-        if any(not 0 <= s[0] < len(names) or self.inputs[s[0]].quantity != "spindle_speed" for s in self.states):
-            raise SettingError("watch: the input of a speed state must be a spindle speed")
+            raise SettingError(
+                f"watch: sensors of inputs {[s.input for s in self.sensors]}: expected one per temperature, {heat}"
+            )
+        for k, s in enumerate(self.states):
+            if not 0 <= s[0] < len(names) or self.inputs[s[0]].quantity != "spindle_speed":
+                raise SettingError(f"watch: speed state {k}: input {s[0]} is not a spindle speed")
         parts = len(heat) * (1 + len(self.time_constants)) + len(self.states)
-        if any(len(s.weights) != parts for s in self.sensors):
-            raise SettingError(f"watch: expected {parts} weights per sensor, one per temperature, lag and speed state")
+        for sensor in self.sensors:
+            if len(sensor.weights) != parts:
+                raise SettingError(
+                    f"watch: sensor {names[sensor.input]} has {len(sensor.weights)} weights; expected {parts}: one for "
+                    "each temperature, each of its lags and each speed state"
+                )
         lagged = len(heat) * (1 + len(self.time_constants))
-        if any(any(s.weights[k : lagged : len(heat)]) for k, s in enumerate(self.sensors)):
-            raise SettingError("watch: a temperature must not be predicted from itself")
+        for k, sensor in enumerate(self.sensors):
+            if any(sensor.weights[k : lagged : len(heat)]):
+                raise SettingError(f"watch: {names[sensor.input]} must not be predicted from itself")
         check_count("watch", ENTRIES, weights=[w for s in self.sensors for w in s.weights])
         check_finite("watch", weights=[w for s in self.sensors for w in s.weights])
         slow, fast = [s[2] for s in self.states], [s[3] for s in self.states]

@@ -132,7 +132,7 @@ def _check_limit(r: Reduced, limits: Limits, to: str) -> None:
         raise InputError(
             f"{r.model.target}: the reduced model corrects by up to {r.most:.0f} um in these recordings, and was "
             f"judged without a limit; {to} would stop at {limits.magnitude:g} um: give --magnitude "
-            f"{1.2 * r.most:.0f} if so large a correction is permitted"
+            f"{1.2 * r.most:.0f} if such a large correction is permitted"
         )
 
 

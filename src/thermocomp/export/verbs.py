@@ -66,7 +66,7 @@ class ExportedCode:
         """Write all files into a folder, or none on an error; return its path."""
         output = Path(folder)
         if output.exists() and not output.is_dir():
-            raise InputError(f"{output}: is not a directory")
+            raise InputError(f"{output}: this is not a directory; name a directory")
         if self.files:
             output.mkdir(parents=True, exist_ok=True)
             with drafts([output / file for file in self.files], overwrite=overwrite) as written:

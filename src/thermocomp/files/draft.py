@@ -55,7 +55,8 @@ class Drafts(dict[Path, Path]):
                     move.replace() if self._overwrite else move.add()
                 except FileExistsError as e:
                     raise InputError(
-                        f"{target}: was created in the meantime; nothing was written: use --overwrite"
+                        f"{target}: the file was created in the meantime, so nothing was written; use --overwrite to "
+                        "replace it"
                     ) from e
             for folder in dict.fromkeys(move.place.parent for move in moves):
                 _flush_folder(folder)
@@ -134,7 +135,7 @@ def drafts(targets: Sequence[Path], *, overwrite: bool) -> Iterator[Drafts]:
         places = {target: find_place(target) for target in targets}
         for target, place in places.items():
             if not overwrite and _status(place) is not None:
-                raise InputError(f"{target}: exists already; {OTHERWISE}")
+                raise InputError(f"{target}: the file exists already; {OTHERWISE}")
         if len(set(places.values())) < len(places):
             raise InputError(f"{', '.join(map(str, targets))}: two of these are the same file; choose other names")
         with _telling(places):

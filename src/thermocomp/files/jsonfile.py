@@ -87,7 +87,7 @@ def unpack(kind: Format, entry: Any, text: str, source: str, **shared: Any) -> A
     _check_kind(kind, content, source)
     body = content.get("models")
     if not isinstance(body, list) or not body:
-        raise ModelFileError(f"{source}: contains no model")
+        raise ModelFileError(f"{source}: the file contains no model")
     try:
         found_digest = digest(body, {k: content[k] for k in kind.shared if k in content})
     except (ValueError, RecursionError) as e:  # 1e999, half a surrogate pair, a hundred brackets

@@ -39,7 +39,9 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
     if any(m.watch != watch for m in models):
-        raise ModelFileError("model file: its models have different watches; write them to separate files")
+        raise ModelFileError(
+            "model file: its models have different watches (sensor monitoring); write them to separate files"
+        )
     shared = None if watch is None else {"watch": asdict(watch)}
     return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models], shared)
 
@@ -61,7 +63,8 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
     if any(m.watch is not None for m in found.models):
         raise ModelFileError(
-            f"{source}: a watch is stored inside a model; it must be stored once in the file, next to the models"
+            f"{source}: a watch (sensor monitoring) is stored inside a model; it must be stored once in the file, "
+            "next to the models"
         )
     models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
     _check_judged(models, source)

@@ -22,21 +22,21 @@ def read_text(path: str | Path, what: str, most: int, failure: type[InputError] 
     source = Path(path)
     try:
         if not stat.S_ISREG(source.stat().st_mode):
-            raise failure(f"{source}: cannot be read as a {what}: it is a folder, a pipe or a device")
+            raise failure(f"{source}: this cannot be read as a {what}: it is a folder, a pipe or a device")
         with source.open("rb") as file:
             content = file.read(most + 1)
         if len(content) > most:
-            raise failure(f"{source}: cannot be read as a {what}: it has more than {most:,} bytes")
+            raise failure(f"{source}: the file cannot be read as a {what}: it has more than {most:,} bytes")
         return content.decode("utf-8-sig")
     except FileNotFoundError as e:
         raise failure(f"{source}: no such {what}") from e
     except UnicodeDecodeError as e:
         found = f"it is not a text file ({e})"
-        raise failure(f"{source}: cannot be read as a {what}: {found}; name a {what}") from e
+        raise failure(f"{source}: the file cannot be read as a {what}: {found}; name a {what}") from e
     except OSError as e:
-        raise failure(f"{source}: cannot be read as a {what}: {e}") from e
+        raise failure(f"{source}: the file cannot be read as a {what}: {e}") from e
     except ValueError as e:  # a null character
-        raise failure(f"{str(source)!a}: is not the name of a {what}: {e}") from e
+        raise failure(f"{str(source)!a} cannot be the name of a {what}: {e}") from e
 
 
 def strict_adapter(kind: type[_T]) -> TypeAdapter[_T]:

@@ -39,7 +39,10 @@ def replay_models(
         used = list(mine.values())
         if start is None:
             (start,) = find_starts([recording], channels, zeroing=used[0].zeroing, absolute=are_absolute(used))
-        notes.append(f"{start.told(recording.name)}; models run behind the gate, {limits.in_words()}")
+        notes.append(
+            f"{start.told(recording.name)}; models run behind the gate (plausibility check of readings), with "
+            f"limits: {limits.in_words()}"
+        )
     for target, model in by_target.items():
         if target not in names:
             notes.append(f"the model of {model.target} is not used: the recording has no channel of this name")
@@ -51,13 +54,18 @@ def replay_models(
         alone = samples.deviations[own, 0] - ran.deviation
         left = [float(np.sqrt(np.nanmean(v**2))) for v in (found[target], alone)]
         if f"{left[0]:.2f}" != f"{left[1]:.2f}":
-            notes.append(f"{target}: residual of the model alone {left[1]:.2f} {model.unit} RMS, not {left[0]:.2f}")
+            notes.append(
+                f"{target}: residual of the model without gate and limits {left[1]:.2f} {model.unit} RMS, with "
+                f"them {left[0]:.2f}"
+            )
         known = find_learned_rows(model, samples)[own]
         if known.all():
-            notes.append(f"the model of {target} was fitted to this recording: its residual is not an honest test")
+            notes.append(
+                f"the model of {target} was fitted to this recording: its residual is not a test on unseen data"
+            )
         elif known.any():
             rows = f"{known.sum():,} of {len(known):,} rows were used for training"
-            notes.append(f"the model of {target}: {rows}: its residual there is not an honest test")
+            notes.append(f"the model of {target}: {rows}: its residual there is not a test on unseen data")
         honest = model.honest_error
         if honest is not None and not model.accepted:
             notes.append(f"the model of {target} was {honest.word} when it was fitted: {honest.why}")

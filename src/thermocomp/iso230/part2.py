@@ -165,7 +165,7 @@ def _shortfalls(test: Positioning) -> tuple[str, ...]:
         runs = len(deviations)
         if runs == 1:
             notes.append(
-                f"a single run in direction {name}: s, R and A require more"
+                f"a single run in direction {name}: s, R and A need at least two"
                 + ("; ISO 230-2 requires no more over 2 m" if long else f", ISO 230-2 requires {RUNS}")
             )
         elif runs < RUNS and not long:

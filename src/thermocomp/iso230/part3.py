@@ -104,7 +104,7 @@ def assess(
             + (f" ({_stations_words(stations)})" if stations else "")
         )
     if len(recording) < 2:
-        raise InputError(f"{recording.name}: has one row; a thermal test needs at least two rows")
+        raise InputError(f"{recording.name}: the recording has only one row; a thermal test needs at least two")
     air = recording.channel(ambient) if ambient is not None else recording.ambient
     if air is not None and air.quantity != "temperature":
         raise InputError(f"{recording.name}: {air.name} is a {air.quantity}; the ambient channel is a temperature")
@@ -265,9 +265,9 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
     elif runs == "spindle" and kind != "spindle":
         notes.append("the spindle turned in this test: its effect is included in the values")
     elif kind == "spindle" and runs != "spindle":
-        notes.append("no turning spindle was recorded: the figures are not those of a spindle test")
+        notes.append("the recording shows no turning spindle: the values are not those of a spindle test")
     elif kind == "etve" and runs == "axis":
-        notes.append("an axis moved in this test: the figures are not those of the environment alone")
+        notes.append("an axis moved in this test: the values are not those of the environment alone")
     named, used = paired_names(recording), {n for p in pairs for n in (p.tip, p.spindle)}
     untold = [f"{named[a, 1]} and {named[a, 2]}" for a in "xy" if {(a, 1), (a, 2)} <= named.keys()]
     if untold and not used:
@@ -278,8 +278,8 @@ def _about(recording: Recording, kind: Kind, pairs: Sequence[Pair], air: Channel
         notes.append("no ambient temperature was identified: name its channel (ambient)")
     if kind == "axis" and not _target_groups(recording):
         notes.append(
-            "no channel is a target position of an axis: name the channels by axis and position, such as x_laser_0, "
-            "x_laser_500"
+            "no channel contains the error at a target position of an axis: name the channels by axis and position, "
+            "such as x_laser_0, x_laser_500"
         )
     return notes
 
@@ -309,8 +309,8 @@ def _about_the_end(curves: Sequence[ThermalCurve]) -> list[str]:
     return [
         f"range of the last 60 min to that of the first: {', '.join(told)}; "
         + ("all are" if calm else "not all are")
-        + f" within the {100 * CALM:.0f} % at which ISO 230-3 permits a spindle test to end "
-        "before 4 h (from memory)"
+        + f" within the {100 * CALM:.0f} % at which ISO 230-3 permits a spindle test to end before 4 h (not "
+        "checked against the text of the standard)"
     ]
 
 
@@ -326,12 +326,12 @@ def _about_rows(recording: Recording, kind: Kind, rows: tuple[int, int, int], nu
     notes = []
     running = recording.time[stop] - recording.time[start]
     if running < HOUR:
-        notes.append(f"the test ran for {running / 60:.0f} min only: no values for the first 60 min are stated")
+        notes.append(f"the test ran for only {running / 60:.0f} min: no values for the first 60 min are given")
     if kind == "etve":
         if (on := find_driven_rows(recording)) is not None and on.any():
             notes.append("the spindle or an axis moves: this is not a test of the environment alone")
         if running < 24 * HOUR * 0.99:
-            notes.append(f"the test is {running / HOUR:.1f} h long; the environment has a period of a day")
+            notes.append(f"the test is {running / HOUR:.1f} h long; the environment varies with a period of one day")
     elif stop == end:
         notes.append("the cool-down was not recorded")
     if kind != "etve" and lead < 2:

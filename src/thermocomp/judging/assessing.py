@@ -81,8 +81,9 @@ def assess(
         raise InputError("no model given: name a model file, or give at least one model")
     if probings and (unknown := [m.target for m in models if m.honest_error is None]):
         raise InputError(
-            f"model of {', '.join(unknown)} was never judged on unseen cycles, so the weight of a probing relative to "
-            "the model is not known; fit the model with 'thermocomp fit', which also judges it"
+            f"model of {', '.join(unknown)} was never judged on unseen cycles, so it is not known how much weight a "
+            "probing (a measurement at the machine) should have; fit the model with 'thermocomp fit', which also "
+            "judges it"
         )
     found: list[Assessment] = []
     covered = None
@@ -194,7 +195,7 @@ def _assess(
             if len(seen) == len(samples.test_names)
             else f"{n:,} of {of:,} rows were used for training"
         )
-        caveat, known = f"no honest test: {why}; judge the model on another recording", np.zeros_like(known)
+        caveat, known = f"not a test on unseen data: {why}; judge the model on another recording", np.zeros_like(known)
     split = Split("all cycles", np.zeros(len(samples), np.bool_), ~known, stretch=_goes_on(model, samples, known))
     found = judge(
         _name(model), model, samples, split,

@@ -203,7 +203,10 @@ def budget(
     splits = [split for split, known in zip(judging.splits, numbers.T, strict=True) if known.all()]
     if not splits:
         called = ", ".join(c.name for c in targets)
-        raise FitError(f"no validation block has values of all of {called}; select sensors for fewer targets at once")
+        raise FitError(
+            f"no validation block (left-out cycle, day or file) has values of all of {called}; select sensors "
+            "for fewer targets at once"
+        )
     samples = samples.only([c.name for c in samples.inputs if c.quantity in ("temperature", "spindle_speed")])
     chosen = _chosen(samples, splits, max_sensors, jobs, progress)
     sensors = [[tuple(temperatures[j] for j in places) for places in sets.sets] for sets in chosen]
@@ -274,7 +277,9 @@ def judged_blocks(samples: Samples, target: int, judging: Judging) -> BoolArray:
     """Return the blocks in which a target has a value for judging, (n_splits,)."""
     found = np.array([np.isfinite(samples.deviations[split.judge, target]).any() for split in judging.splits])
     if not found.any():
-        raise FitError(f"{samples.targets[target].name} has no value in any validation block")
+        raise FitError(
+            f"{samples.targets[target].name} has no value in any validation block (left-out cycle, day or file)"
+        )
     return found
 
 

@@ -48,7 +48,7 @@ def connect(address: str) -> Iterator["Cluster"]:
             # The client would wait forever for the first message of a server that only listens.
             with socket.create_connection((host, port), ANSWERS) as line:
                 if speaks and not line.recv(1):
-                    raise ConnectionError("the connection was closed")
+                    raise ConnectionError("the server closed the connection")
             client = Client(address, timeout=ANSWERS, set_as_default=False, name="thermocomp")
         except (OSError, ValueError) as e:
             raise ClusterError(

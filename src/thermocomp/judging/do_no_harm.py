@@ -30,14 +30,14 @@ LEVEL = 0.05
 #: baselines for comparison
 BASELINES = ("no compensation", "the learned mean", "the last learned value")
 #: fourth baseline for a single continuous block: without model, both relative to the mean of the block's first rows
-NAMES = (*BASELINES, "none, both re-zeroed at the start of the block")
+NAMES = (*BASELINES, "no compensation, both re-zeroed at the start of the block")
 REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
 #: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
 TIMES_NOISE, SHARE = 3.0, 0.05
 #: reason against acceptance if the effects of noise and lost sensors were not tested
-UNTRIED = "noise and lost sensors were not tried: compare with robustness=True"
+UNTRIED = "the effects of noise and of a lost sensor were not tested: compare with robustness=True"
 #: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
 MOVES = 0.1
 
@@ -185,7 +185,7 @@ class Verdict:
         """Reason for the verdict in one sentence, with the decisive cycle, file or baseline."""
         if self.refusal or not self.units:
             return self.refusal or f"every cycle has fewer than {MIN_ROWS} rows of validation data"
-        stated = "" if self.stated is None else f"; the harm margin of {self.stated:g} {self.unit} was stated"
+        stated = "" if self.stated is None else f"; the harm margin was set to {self.stated:g} {self.unit}"
         return self._by_units() + stated
 
     def _by_units(self) -> str:
@@ -211,14 +211,17 @@ class Verdict:
         if self.caps:
             return "; ".join(self.caps)
         if n < MIN_UNITS:
-            return f"judged on {_count(n, 'unit')}, at least {MIN_UNITS} are needed"
+            return f"judged on only {n} of {MIN_UNITS} required cycles or files"
         if moving < MIN_UNITS - 1:
-            return f"only {moving} of {n} units have a significant drift"
+            return f"only {moving} of {n} cycles or files have a significant drift"
         return f"not shown to be better than {self.names[self.worst]}: {self._pooled(self.worst)}, {self._tested()}"
 
     def _tested(self) -> str:
         tried = f", {self.tried} methods tried" if self.tried > 1 else ""
-        return f"p = {self.p_value:.2g} over {len(self.units)} units{tried}{', ' if self.about else ''}{self.about}"
+        return (
+            f"p = {self.p_value:.2g} over {len(self.units)} cycles or "
+            f"files{tried}{', ' if self.about else ''}{self.about}"
+        )
 
     @property
     def told(self) -> str:
@@ -262,7 +265,7 @@ class Verdict:
     def _pooled(self, k: int) -> str:
         pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
         mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
-        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all units"
+        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
 
 
 def measure(

@@ -152,7 +152,9 @@ def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
     needed = do_no_harm.MIN_UNITS
     if covered.independent >= needed or covered.units < needed:
         return ()
-    return (f"only {covered.independent} of {covered.units} units are distinct, at least {needed} are needed",)
+    return (
+        f"only {covered.independent} of {covered.units} cycles or files are distinct, at least {needed} are needed",
+    )
 
 
 def _caps(
@@ -168,7 +170,8 @@ def _caps(
         found.append("judged on one section that continues the training data")
     if learned is None:
         found.append(
-            "the model does not state the training values, so it cannot be compared with their mean and last value"
+            "the model does not contain the mean and last value of the training data, so it cannot be compared with "
+            "these constants"
         )
     return tuple(found)
 

@@ -58,6 +58,6 @@ def _told(samples: Samples, copies: IntArray, origin: IntArray, k: int, block: s
     return (
         f"{later}: rows {samples.row[copies[a]]}-{samples.row[copies[b]]} repeat rows "
         f"{samples.row[origin[a]]}-{samples.row[origin[b]]} of "
-        f"{'the same recording' if later == earlier else earlier}, approximately: with {block} left out, the same data "
-        "would be used for both training and validation. Delete one of the two copies"
+        f"{'the same recording' if later == earlier else earlier} (approximate rows): with {block} left out, the "
+        "same data would be used for both training and validation. Delete one of the two copies"
     )

@@ -37,13 +37,16 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
         if (mine := rows & (samples.cycle == k)).sum() > 2 * HALF_WINDOW
     ]
     if not temperatures or not sets:
-        raise FitError(f"maximal correlation: no thermal cycle has more than {2 * HALF_WINDOW} complete rows")
+        raise FitError(
+            "maximal correlation needs at least one temperature and one thermal cycle with more than "
+            f"{2 * HALF_WINDOW} complete rows"
+        )
     subsets = subsets_up_to(len(names), settings.most("ace"))
     share = None if elsewhere.get() is None else _share
     psi = maximal_correlations(sets, subsets, half_window=HALF_WINDOW, jobs=jobs, share=share, progress=progress)
     done = np.isfinite(psi.psi).all(axis=(0, 1))
     if not done.any():
-        raise FitError("stopped before the first thermal cycle was completed")
+        raise FitError("the calculation was stopped before the first thermal cycle was completed")
     same = equivalents(list(psi.psi[:, :, done]), psi.subsets, level=settings.level, holm=settings.holm)
 
     total = dict(zip(same.subsets, same.summed.sum(axis=0).tolist(), strict=True))

@@ -42,8 +42,8 @@ class Probings:
     def __post_init__(self) -> None:
         if not 0.0 < self.every < np.inf or not 0.0 <= self.repeatability < np.inf:
             raise InputError(
-                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: expected a time above "
-                "0 s and a repeatability of at least 0 um"
+                f"probings every {self.every:g} s, repeatability {self.repeatability:g} um: expected an interval "
+                "above 0 s and a repeatability of at least 0 um"
             )
 
     @classmethod
@@ -58,8 +58,8 @@ class Probings:
         found = _WRITTEN.fullmatch(text.strip())
         if found is None:
             raise InputError(
-                f"probing {text!r}: write how often in h or min, and the probe's repeatability (standard deviation) "
-                f"if it is not {cls.repeatability:g} um, such as 'every 2 h' or 'every 30 min, 0.3 um'"
+                f"probing {text!r}: write the interval in h or min, and the probe's repeatability (standard "
+                f"deviation) if it is not {cls.repeatability:g} um, such as 'every 2 h' or 'every 30 min, 0.3 um'"
             )
         every = float(found["n"]) * _SECONDS[found["unit"][0]]
         return cls(every) if found["um"] is None else cls(every, float(found["um"]))

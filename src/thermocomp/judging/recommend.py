@@ -142,11 +142,14 @@ def correct_verdicts(
     """Correct the verdicts on the methods tried for one target for the number of methods."""
     after = dict(zip(verdicts, do_no_harm.holm(list(verdicts.values())), strict=True))
     if primary is not None:
-        after[primary] = replace(after[primary], p=None, about="named beforehand")
+        after[primary] = replace(after[primary], p=None, about="primary method set before the evaluation")
     elif found is not None and found.verdict.accepted:
         mine = after[found.method]
         better = min(found.verdict.p_value, mine.p_value)
         after[found.method] = replace(
-            mine, p=better, about="selected again without each unit, and judged including this selection"
+            mine,
+            p=better,
+            about="selected again in each fold with the left-out cycle or file excluded, so the selection is part "
+            "of the test",
         )
     return after

@@ -44,9 +44,7 @@ class Rules:
     def check(self, names: Sequence[str]) -> None:
         """Raise `InputError` if the primary method is not among the methods compared."""
         if self.primary is not None and self.primary not in names:
-            raise InputError(
-                f"primary method {self.primary!r} is not among the compared methods; compared are {', '.join(names)}"
-            )
+            raise InputError(f"primary method {self.primary!r} is not among the compared methods, {', '.join(names)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +210,8 @@ class Assessment:
         if self.caveat or not self.learned:
             return told
         return (
-            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training: left out"
+            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training and are "
+            "left out"
         )
 
 

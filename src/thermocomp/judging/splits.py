@@ -197,7 +197,7 @@ def parse(text: str, samples: Samples) -> Judging:
 def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
     rows = np.arange(n)
     if first < 1 or stop <= first:
-        raise InputError(f"{name}: leaves no row for training or none for validation ({n} rows in all)")
+        raise InputError(f"{name}: no row is left for training, or none for validation ({n} rows in all)")
     return Judging(
         name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop), stretch=True),)
     )

@@ -103,7 +103,7 @@ def fit(
 def honest_error(overall: Assessment, judging: Judging) -> HonestError:
     """Summarise an assessment for the model file."""
     if overall.failure:
-        raise InputError(f"{overall.target}: cannot be judged: {overall.failure}")
+        raise InputError(f"{overall.target} cannot be judged: {overall.failure}")
     rms, none = overall.metric("rms"), overall.none_metric("rms")
     word, reason = overall.word, overall.reason
     if word == "accepted" and rms > none:  # one long cycle, within the margin, against many short ones

@@ -37,14 +37,17 @@ def find_faults(settings: ServiceSettings) -> Iterator[str]:
         parts = re.compile(rf"{re.escape(journal.stem)}\.\d+{re.escape(journal.suffix)}(-wal|-shm)?")
         for path in (folder / name for name in sent):
             if path.parent.resolve() == journal.parent.resolve() and parts.fullmatch(path.name):
-                yield f"{path}: may be a part of the journal {journal} and would be overwritten; name another file"
+                yield (
+                    f"{path}: the file may be a part of the journal {journal} and would be overwritten; name "
+                    "another file"
+                )
     for name in dict.fromkeys(written):
         if name in locks and not (folder / name).parent.is_dir():  # reported for the file itself
             continue
         if why := _unwritable(folder / name):
             yield f"{folder / name}: {why}"
         if names[(folder / name).resolve()] > 1:
-            yield f"{folder / name}: is named more than once and would be overwritten; name another file"
+            yield f"{folder / name}: this file is named more than once and would be overwritten; name another file"
     for one in config.sinks:
         if isinstance(one, LinuxCncOut) and len(os.fsencode(folder / one.socket)) > LONGEST:
             yield f"{folder / one.socket}: the path of a socket has at most {LONGEST} bytes; choose a shorter one"
@@ -104,12 +107,12 @@ def _unwritable(path: Path) -> str:
     if len(os.fsencode(path.name)) > _LONG:
         return f"the name has {len(os.fsencode(path.name))} bytes; at most {_LONG} are allowed"
     if path.exists() and not path.is_file():
-        return f"is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
+        return f"this is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
     if not path.parent.is_dir():
         return f"there is no folder {path.parent}"
     if not os.access(path.parent, os.W_OK):
-        return f"directory not writable: {path.parent}"
-    return "is read-only" if path.exists() and not os.access(path, os.W_OK) else ""
+        return f"the folder {path.parent} is not writable"
+    return "the file is read-only" if path.exists() and not os.access(path, os.W_OK) else ""
 
 
 def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
@@ -117,11 +120,14 @@ def _faults_of_setup(socket: Path, axes: set[str]) -> Iterator[str]:
     hal = socket.with_name(HAL_NAME)
     do = "run 'thermocomp linuxcnc setup': its output names the socket to which the service connects"
     if socket.exists() and not socket.is_socket():
-        yield f"{socket}: is not a socket; {do}"
+        yield f"{socket}: this is not a socket; {do}"
     elif hal.is_file():
         there = set(re.findall(r"--axis (\w),", hal.read_text(encoding="utf-8", errors="replace")))
         if missing := axes - there:
             lacking = ", ".join(sorted(missing)).upper()
-            yield f"{hal}: does not correct {lacking}; run 'thermocomp linuxcnc setup' again with --axes"
+            yield (
+                f"{hal}: the file has no correction of axis {lacking}; run 'thermocomp linuxcnc setup' again "
+                "with --axes"
+            )
     elif not socket.exists():
         yield f"{socket}: LinuxCNC is not set up there: there is no {HAL_NAME}; {do}"

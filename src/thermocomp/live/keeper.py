@@ -47,7 +47,7 @@ class StateKeeper:
         except ThermocompError as e:
             if not statefile.is_ours(self._path):
                 raise InputError(
-                    f"{self._path}: is not a state file and would be overwritten; name another file"
+                    f"{self._path}: this is not a state file and would be overwritten; name another file"
                 ) from e
             self._say(f"cold start: {e}")
             self._refused = self._path

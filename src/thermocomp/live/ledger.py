@@ -76,7 +76,7 @@ class ProbingLedger:
         if waiting:
             return "another measurement is waiting for the next reading"
         unknown = found.left and in_force is None
-        return "the correction in force at the controller is not known" if unknown else ""
+        return "it is not known which correction was in force at the controller" if unknown else ""
 
     def take(self) -> dict[str, Probing]:
         """Return the pending probings for a reading, and clear them."""

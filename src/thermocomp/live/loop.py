@@ -223,7 +223,9 @@ class Service:
             why, moved = said.refused.get(target), said.moved.get(target, 0.0)
             self.say(
                 "probing",
-                f"{target} refused: {why}" if why else f"{target} accepted: the prediction changes by {moved:+.1f} um",
+                f"{target} refused: {why}"
+                if why
+                else f"probing of {target} accepted: the prediction changes by {moved:+.1f} um",
             )
         self.curves.take(self.clock.now(), said, self.latest)
         self._dirty = True

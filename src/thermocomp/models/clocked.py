@@ -212,6 +212,7 @@ def rms(error: FloatArray) -> float:
 def too_few(n: int, k: int, m: int, data: Clocked) -> str:
     """Return the message that there are too few rows for the given orders."""
     return (
-        f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} ticks have a known past, which is not "
-        "more than the number of coefficients; use a shorter interval, smaller orders or a longer recording"
+        f"k = {k} and m = {m} at an interval of {data.interval:g} s: only {n} time steps have all the earlier values "
+        "that the model needs, no more than it has coefficients; use a shorter interval, smaller orders or a longer "
+        "recording"
     )

@@ -88,7 +88,7 @@ def check_numbers(predicted: Any, n_rows: int, name: str) -> FloatArray:
         found = np.asarray(predicted, dtype=np.float64)
     if found.shape not in ((n_rows,), (n_rows, 1)):
         raise FitError(
-            f"{name}: predict returned an array of shape {found.shape} for {n_rows} rows; expected one number per row"
+            f"{name}: predict returned an array of shape {found.shape} for {n_rows} rows; expected shape ({n_rows},)"
         )
     wrong = np.flatnonzero(~np.isfinite(found))
     if wrong.size:

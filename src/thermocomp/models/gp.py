@@ -103,4 +103,4 @@ class GaussianProcess(UnfrozenRegressor):
 
     def _bulk(self) -> str:
         numbers = self._rows.size + self._weights.size
-        return f"it requires its {self.n_rows_} training rows ({numbers} numbers)"
+        return f"a prediction needs all {self.n_rows_} training rows ({numbers} numbers)"

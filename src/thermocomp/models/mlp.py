@@ -217,7 +217,7 @@ class SigmoidNet(NetRegressor):
         """Select the number of hidden nodes by cross-validation (C-26)."""
         counts = sorted({int(h) for h in np.atleast_1d(np.asarray(self.hidden))})
         if not counts:
-            raise InputError("hidden: no number of hidden nodes to choose from; give at least one")
+            raise InputError(f"hidden = {self.hidden}: expected at least one number of hidden nodes to choose from")
 
         def rms(n_hidden: int, fold: int) -> float:
             rest, mine = folds != fold, folds == fold

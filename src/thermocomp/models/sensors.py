@@ -123,7 +123,7 @@ class SensorSelector(SelectorMixin, BaseEstimator):
         mask[:1] = self.time == "column"
         for column in self.keep:
             if isinstance(column, str) and column not in names:
-                raise InputError(f"SensorSelector: keep {column!r}: the columns are {', '.join(names)}")
+                raise InputError(f"SensorSelector: keep {column!r}: no such column; the columns are {', '.join(names)}")
             place = names.index(column) if isinstance(column, str) else int(column)
             if not 0 <= place < len(names):
                 raise InputError(f"SensorSelector: keep {column!r}: expected an index from 0 to {len(names) - 1}")

@@ -230,7 +230,7 @@ class TimedRegressor(ThermalRegressor):
         names = [str(n) for n in self._names()]
         if isinstance(column, str):
             if column not in names:
-                raise InputError(f"{what} {column!r}: the columns are {', '.join(names)}")
+                raise InputError(f"{what} {column!r}: no such column; the columns are {', '.join(names)}")
             return names.index(column)
         place = int(column) - self._hidden
         if not 0 <= place < len(names):

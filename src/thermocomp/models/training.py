@@ -105,7 +105,7 @@ def fit_method(name: str | BaseEstimator, samples: Samples, target: int, learn: 
     seen = valid & learn & np.isfinite(samples.deviations[:, target])
     if seen.sum() < 3:
         raise FitError(
-            f"{how.name}: {int(seen.sum())} complete training rows of {channel.name}; at least 3 are required"
+            f"{how.name}: only {int(seen.sum())} complete training rows of {channel.name}; at least 3 are required"
         )
     _refuse_unknown_counts(samples, seen)
     speeds = tuple(samples.inputs[j].name for j in columns if samples.inputs[j].quantity == "spindle_speed")

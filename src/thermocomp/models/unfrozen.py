@@ -85,7 +85,7 @@ class EstimatorModel(ErrorModel):
         return {}
 
     def _expression(self, change: Sequence[Node]) -> NoReturn:  # noqa: ARG002 - always raises
-        raise InputError(f"{self.estimator.name} is not an expression: it cannot be exported")
+        raise InputError(f"{self.estimator.name} has no formula, so it cannot be exported; export another method")
 
     def formula(self) -> str:
         """Return a description of the model in one line of text."""

@@ -60,7 +60,7 @@ class Claim:
 
     def __post_init__(self) -> None:
         if self.holds is False and not self.finding:
-            raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding")
+            raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding that explains it")
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,7 +121,8 @@ class Shift(Step):
     def __post_init__(self) -> None:
         if not self.channels or self.by_s == 0:
             raise self._refuse(
-                'specify the channels with the wrong clock and its correction: channels = ["t1_C"] and by_s = -1200.0'
+                'specify the channels whose clock is wrong, and the time shift [s]: channels = ["t1_C"] and by_s = '
+                "-1200.0"
             )
 
     def apply(self, rows: Rows) -> Rows:
@@ -168,7 +169,7 @@ class Rezero(Step):
 
     def __post_init__(self) -> None:
         if not self.channels:
-            raise self._refuse('specify the probe and the time: channels = ["z_um"] and at = 3600.0')
+            raise self._refuse('specify the channel of the probe and the time [s]: channels = ["z_um"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
         """Return the rows with the values of the probe offset."""
@@ -211,7 +212,7 @@ class Swap(Step):
 
     def __post_init__(self) -> None:
         if len(set(self.channels)) != 2:
-            raise self._refuse('specify the two channels and the time: channels = ["t1_C", "t2_C"] and at = 3600.0')
+            raise self._refuse('specify the two channels and the time [s]: channels = ["t1_C", "t2_C"] and at = 3600.0')
 
     def apply(self, rows: Rows) -> Rows:
         """Return the rows with the values of the two channels exchanged."""
@@ -271,7 +272,10 @@ def _step(x: FloatArray, first: int, name: str, owner: str) -> float:
     before = np.flatnonzero(np.isfinite(x[:first]))[-_BESIDE:]
     after = first + np.flatnonzero(np.isfinite(x[first:]))[:_BESIDE]
     if not before.size or not after.size:
-        raise InputError(f"{owner}: {name} has no value before the instant, from which it could continue; give `to`")
+        raise InputError(
+            f"{owner}: {name} has no value before or after the given time, so the step there is unknown; give "
+            "`to`, the value after it"
+        )
     y = x[np.concatenate([before, after])]
     moves = np.concatenate([np.diff(x[before]), np.diff(x[after])])
     slope = float(np.median(moves)) if moves.size else 0.0

@@ -45,8 +45,8 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     if not recording.has(name):
         if recording.has(residual):
             raise RecordingError(
-                f"{where}: there is {residual}, measured under compensation, but no {name}: add a column {name}, which "
-                f"is {residual} - {correction}"
+                f"{where}: there is {residual}, measured with compensation active, but no {name}: add a column "
+                f"{name} = {residual} - {correction}"
             )
         return
     channel = recording.channel(name)
@@ -62,8 +62,9 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     if not recording.has(residual):
         if (c != 0.0).any():
             raise RecordingError(
-                f"{where}: {name} was measured while {correction} was in force, so it may be compensated or not: "
-                f"name it {residual}, and add {name}, which is {residual} - {correction}"
+                f"{where}: {name} was measured while {correction} was in force, so it is not known whether its "
+                f"values are compensated: if they are, name it {residual}, and add a column {name} = {residual} - "
+                f"{correction}"
             )
         return
     d, r = _values(recording, name), _values(recording, residual)
@@ -77,8 +78,8 @@ def _refuse(recording: Recording, target: str, where: str) -> None:
     worst = int(known[np.argmax(np.abs(off[known]))])
     if abs(off[worst]) > ROUNDED:
         raise RecordingError(
-            f"{where}: in row {worst} {name} is {d[worst]:g} um, and {residual} - {correction} is "
-            f"{r[worst]:g} - ({c[worst]:g}) um: one of them is wrong; {sound}"
+            f"{where}: in row {worst} {name} is {d[worst]:g} um, and {residual} - {correction} is {r[worst]:g} - "
+            f"({c[worst]:g}) um: they must be equal; {sound}"
         )
 
 

@@ -65,9 +65,9 @@ class ProfileOptions:
             hint = (
                 f"{component.description} does not depend on a position"
                 if component
-                else "it is not the code of a component"
+                else "it is not the name of an error component"
             )
-            raise InputError(f"{self.target}: {hint}; name a component such as EYY, or specify the axis")
+            raise InputError(f"{self.target}: {hint}; give an error component such as EYY, or specify the axis")
         if unit not in QUANTITY:
             raise InputError(f"{self.target}: unit {unit!r}: state whether it is in um or urad")
         return axis, cast(Literal["um", "urad"], unit)
@@ -147,15 +147,20 @@ class Profiles:
         if component is not None:
             if component.depends_on != self.axis:
                 along = f"is one along {component.depends_on}" if component.depends_on else "has no profile"
-                raise InputError(f"{owner}: {component.description} {along}; these are along {self.axis}")
+                raise InputError(f"{owner}: {component.description} {along}; the given profiles are along {self.axis}")
             if component.unit != self.unit:
-                raise InputError(f"{owner}: {component.description} is in {component.unit}; these are in {self.unit}")
+                raise InputError(
+                    f"{owner}: {component.description} is in {component.unit}; the given profiles are in {self.unit}"
+                )
         if self.points.ndim != 2 or self.points.shape[1] != 3:
-            raise RecordingError(f"{owner}: points of shape {self.points.shape}: expected x, y, z of each")
+            raise RecordingError(
+                f"{owner}: points of shape {self.points.shape}: expected (n_points, 3), the X, Y and Z of each point"
+            )
         wanted = (len(self.states), len(self.points))
         if self.values.shape != wanted:
             raise RecordingError(
-                f"{owner}: values of shape {self.values.shape} for {wanted[0]} states and {wanted[1]} points"
+                f"{owner}: values of shape {self.values.shape}: expected {wanted}, one row per thermal state and one "
+                "column per point"
             )
         if not np.isfinite(self.points).all():
             k = int(np.flatnonzero(~np.isfinite(self.points).all(axis=1))[0])
@@ -165,7 +170,8 @@ class Profiles:
         if np.isinf(self.values).any():
             state, k = np.argwhere(np.isinf(self.values))[0]
             raise RecordingError(
-                f"{owner}: infinite in state {state + 1} at {_place(self.points[k])}: leave out what was not measured"
+                f"{owner}: infinite in state {state + 1} at {_place(self.points[k])}: leave values that were not "
+                "measured empty (NaN)"
             )
         self._check_positions()
 
@@ -230,7 +236,7 @@ class Profiles:
         n = len(self)
         wrong = [int(k) for k in rows if not -n <= k < n]
         if wrong or not rows.size:
-            raise InputError(f"{self._owner}: there is no reference state {wrong or 'named'}; there are 0 to {n - 1}")
+            raise InputError(f"{self._owner}: reference state {wrong or 'missing'}: expected numbers from 0 to {n - 1}")
         return np.unique(rows % n)
 
     def cold(self, reference: int | Sequence[int] = 0) -> FloatArray:
@@ -272,7 +278,7 @@ class Profiles:
         n_positions = len(np.unique(self.position[self.position != reference_position])) + offset
         if order < 0 or not powers or n_positions <= len(powers):
             raise InputError(
-                f"{self._owner}: {len(powers)} factors cannot be fitted to {n_positions} positions; choose from 1 to "
+                f"{self._owner}: {len(powers)} coefficients cannot be fitted to {n_positions} positions; choose 1 to "
                 f"{n_positions - 1}"
             )
         q = 1e-3 * (self.position - reference_position)

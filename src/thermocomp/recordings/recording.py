@@ -84,13 +84,18 @@ class Recording:
         if len(self.time) != len(self.table):
             raise RecordingError(f"{self.name}: {len(self.time)} times for {len(self.table)} rows")
         if list(self.table.columns) != [c.name for c in self.channels]:
-            raise RecordingError(f"{self.name}: table columns and channels differ")
+            raise RecordingError(
+                f"{self.name}: the columns of the table, {list(self.table.columns)}, are not the channels, "
+                f"{[c.name for c in self.channels]}"
+            )
         if len(self.time) > 1 and not (np.diff(self.time) > 0).all():
             row = int(np.flatnonzero(~(np.diff(self.time) > 0))[0]) + 1
             raise RecordingError(f"{self.name}: time does not increase at row {row}")
         covered = [row for c in self.cycles for row in (c.start, c.stop)]
         if covered != sorted(covered) or covered[:1] != [0] or covered[-1:] != [len(self.time)]:
-            raise RecordingError(f"{self.name}: cycles {self.cycles} do not cover the {len(self.time)} rows")
+            raise RecordingError(
+                f"{self.name}: cycles {self.cycles}: expected consecutive cycles that cover rows 0 to {len(self.time)}"
+            )
 
     @classmethod
     def from_dataframe(

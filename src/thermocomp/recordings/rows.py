@@ -117,6 +117,6 @@ class Rows:
         """Raise `InputError` unless each row is later than the previous one."""
         if not (np.diff(self.time) > 0).all():
             raise InputError(
-                f"{self.source}: {owner}: requires one row per time, but several rows have the same time; remove the "
+                f"{self.source}: {owner} requires one row per time, but several rows have the same time; remove the "
                 "duplicates first"
             )

@@ -47,7 +47,7 @@ def stack(
         Initial state of each recording, or of all of them. Default: determined from the recordings.
     """
     if not recordings:
-        raise InputError("no recording given")
+        raise InputError("no recording given: give at least one")
     refuse_compensated(recordings, targets)
     target_channels, input_channels = _chosen_channels(recordings, targets, inputs)
     first = recordings[0]

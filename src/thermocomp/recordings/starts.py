@@ -75,11 +75,15 @@ class Start:
         if self.word not in WORDS:
             raise InputError(f"start {self.word!r}: must be one of {', '.join(WORDS)}")
         if self.word == "continued" and not self.earlier:
-            raise InputError("a test that is continued needs the earlier file: name it with --continues, or earlier=")
+            raise InputError(
+                "start 'continued' needs the earlier file: name it with --continues, or earlier= in Python"
+            )
         if self.earlier and self.word not in ("continued", "rezeroed"):
-            raise InputError(f"an earlier file requires a start that is continued or rezeroed, not {self.word}")
+            raise InputError(
+                f"an earlier file was given, but the start is {self.word!r}: expected 'continued' or 'rezeroed'"
+            )
         if self.zero and self.word != "known":
-            raise InputError(f"temperatures of the zero require a start that is known, not {self.word}")
+            raise InputError(f"temperatures of the zero were given, but the start is {self.word!r}: expected 'known'")
         if self.gap is not None and not 0 < self.gap < np.inf:
             raise InputError(f"a gap of {self.gap:g} s between two files: must be more than 0 s")
 
@@ -121,7 +125,7 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
         elif stamped is not None:
             gap, how = stamped, "by their time stamps"
         else:
-            gap, how = before.sampling_interval, "taken as one sampling interval: neither stamped nor stated"
+            gap, how = before.sampling_interval, "assumed to be one sampling interval: no time stamps, no stated gap"
         if not gap > 0:
             raise InputError(
                 f"{after.name} cannot continue {before.name}: by their time stamps it begins {-gap:g} s before the end "

@@ -179,8 +179,8 @@ def take(
         )
     if abs(error) > before.most + IMPLAUSIBLE * repeatability:
         return before, (
-            f"{error:+.1f} um from the model, whose error can be {before.most:.1f} um at most: check the probe, the "
-            "tool and the unit; if the tool point did move this far, set the zero again"
+            f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
+            "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
         )
     (mean, covariance), spread = before.at(time), before.spread
     weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
@@ -191,7 +191,8 @@ def take(
     if alike and time - since < APART:  # possibly the same chip as before
         return (
             before,
-            f"as implausible as the previous probing: measure again, {APART / 60:.0f} min or more after that one",
+            "as implausible as the previous probing, and too soon to confirm it: measure again, at least "
+            f"{APART / 60:.0f} min after that one",
         )
     plausible = abs(surprise) <= IMPLAUSIBLE * typical
     first = not time - before.time <= OFFSET

@@ -120,7 +120,7 @@ class Compensator:
         """
         targets = [m.target for m in sources]
         if len(set(targets)) != len(targets):
-            raise InputError(f"two models for the same target among {', '.join(targets)}")
+            raise InputError(f"two models for the same target among {', '.join(targets)}; give one model per target")
         models: list[ErrorModel] = []
         lines: dict[str, DeviationLine] = {}
         for source in sources:
@@ -297,7 +297,7 @@ class Compensator:
                 done.states[target] = Status("restarting", "its zero is being averaged")
                 continue
             if target not in done.references:
-                done.references[target] = Reference(times[0], "start: mean over the first readings")
+                done.references[target] = Reference(times[0], "mean over the first readings after the start")
             zero, probing = done.references[target].shift, fresh.get(target)
             known, most = done.learned.get(target), self.limits.magnitude
             answer = evaluate(line, self.models, stepped, times[1], known, probing, failed, zero, most)
@@ -354,5 +354,8 @@ def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
     for model in models:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
-            return f"without {' and '.join(lost)}, the model of {model.target} does harm or was not judged"
+            return (
+                f"without {' and '.join(lost)}, the model of {model.target} is worse than no compensation or was "
+                "not tested"
+            )
     return ""

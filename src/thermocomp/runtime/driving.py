@@ -41,7 +41,7 @@ class Driven:
             learned=dict(state.learned),
             references=dict(state.references),
             raw=dict(state.raw),
-            refused=dict.fromkeys(probed, "no model drives the correction"),
+            refused=dict.fromkeys(probed, "no model computes the correction"),
             arrived=state.away is not None,
         )
 
@@ -75,7 +75,7 @@ def drive(
     after = limit_line(wanted, before, line.travel, travel, limits)
     if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, limits.dead_band):
         return after, Status(
-            "restarting", f"compensation did not run for {state.away:.0f} s; probe, or set the zero again"
+            "restarting", f"compensation did not run for {state.away:.0f} s; measure with the probe, or re-zero"
         )
     return after, ACTIVE
 
@@ -113,7 +113,7 @@ def rest(
             states[target] = order
             continue
         word: Literal["fading", "holding"] = "fading" if idle[target] > limits.hold else "holding"
-        states[target] = Status(word, f"no model has driven the correction for {idle[target]:.0f} s: {why}")
+        states[target] = Status(word, f"no model has updated the correction for {idle[target]:.0f} s: {why}")
     return Rest(moved, clock, idle, states)
 
 

@@ -53,10 +53,11 @@ class Fleet:
         model = self.model
         if not isinstance(model, LinearDynamic) or model.support.policy != "clip" or model.unit != "um":
             raise InputError(
-                f"model of {model.target}: a fleet supports only linear models with lags, in um, that clip their inputs"
+                f"model of {model.target}: a fleet supports only linear models with lags that predict um and clip "
+                "their inputs"
             )
         if any(len(signal) != 1 for signal in model.signals):
-            raise InputError(f"model of {model.target}: a fleet supports only models whose signals are single inputs")
+            raise InputError(f"model of {model.target}: a fleet does not support models with products of inputs")
         model.check_may_run()
         zero = np.array(self.zeros, dtype=np.float64)
         if zero.ndim != 2 or zero.shape[1] != len(model.inputs):
@@ -64,7 +65,10 @@ class Fleet:
                 f"zeros: expected finite values of shape (n_machines, {len(model.inputs)}), got shape {zero.shape}"
             )
         if not np.isfinite(zero).all():
-            raise InputError("zeros: must be finite; remove NaN and infinity")
+            raise InputError(
+                f"zeros: {int(np.count_nonzero(~np.isfinite(zero)))} of {zero.size} values are not finite; "
+                "remove NaN and infinity"
+            )
         n, kind = len(zero), self.dtype
         ranges = [[find_plausible_range(i, z) for z in column] for i, column in zip(model.inputs, zero.T, strict=True)]
         bounds = np.array(ranges).reshape(len(model.inputs), n, 2)

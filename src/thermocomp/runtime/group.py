@@ -13,7 +13,7 @@ from thermocomp.core.state import State
 from thermocomp.runtime.gate import Ranges
 
 #: reported as outside if each input is inside its own range but their combination is unlike the training
-TOGETHER = "inputs together"
+TOGETHER = "combination of inputs"
 
 
 class Group:

@@ -38,7 +38,9 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
     if target not in compensator.lines:
         raise InputError(f"there is no target {target}: expected one of {', '.join(compensator.lines)}")
     if status is not None and status.word not in ("holding", "shadow", "suspended"):
-        raise InputError(f"{target}: {status.word} cannot be ordered: expected holding, shadow or suspended")
+        raise InputError(
+            f"{target}: {status.word!r} is not a state that can be ordered: expected holding, shadow or suspended"
+        )
     if target in compensator.shadow and (status is None or status.word != "suspended"):
         raise InputError(f"{target} runs in shadow only: {compensator.shadow[target].reason}")
     orders = {t: s for t, s in state.orders.items() if t != target} | ({} if status is None else {target: status})

@@ -49,12 +49,12 @@ class Climate:
 
     def __post_init__(self) -> None:
         if not self.memory > 0:
-            raise SettingError("must be positive", ("memory",))
+            raise SettingError(f"expected a positive time, found {self.memory:g} s", ("memory",))
         if not -30.0 <= self.mean <= 60.0:
             raise SettingError(f"{self.mean:g} degC: must be from -30 to 60", ("mean",))
         for name in ("wander", "draught"):
-            if not getattr(self, name) >= 0:
-                raise SettingError("must not be negative", (name,))
+            if not (value := getattr(self, name)) >= 0:
+                raise SettingError(f"expected at least 0, found {value:g}", (name,))
 
     @property
     def middle(self) -> Air:

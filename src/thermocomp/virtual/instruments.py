@@ -137,10 +137,10 @@ class Touch:
 
     def __post_init__(self) -> None:
         if not self.every > 0:
-            raise SettingError("must be positive", ("every",))
+            raise SettingError(f"expected a positive interval, found {self.every:g} s", ("every",))
         for name in ("noise", "resolution"):
-            if not getattr(self, name) >= 0:
-                raise SettingError("must not be negative", (name,))
+            if not (value := getattr(self, name)) >= 0:
+                raise SettingError(f"expected at least 0 um, found {value:g} um", (name,))
         if not self.points:
             raise SettingError("write at least one point, such as points = {p1 = [300, 250, 250]}", ("points",))
         check_labels(self.points)

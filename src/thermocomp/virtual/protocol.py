@@ -60,9 +60,9 @@ class RecordingSetup:
 
     def __post_init__(self) -> None:
         if not self.sampling > 0:
-            raise SettingError("must be positive", ("sampling",))
+            raise SettingError(f"expected a positive interval, found {self.sampling:g} s", ("sampling",))
         if not (self.places or self.probes or self.touch):
-            raise SettingError("nothing is recorded: name a place or a probe", ("places",))
+            raise SettingError("nothing is recorded: give at least one of places, probes and touch", ("places",))
 
     def instruments(self, kit: Kit, noise: float | None = None) -> list[Instrument]:
         """Return the mounted instruments: temperatures, displacements, probed points.
@@ -135,7 +135,7 @@ class PlannedTest(RecordingSetup, Stretch):
         RecordingSetup.__post_init__(self)
         Stretch.__post_init__(self)
         if not 1 <= self.copies <= MOST_COPIES:
-            raise SettingError(f"must be from 1 to {MOST_COPIES}", ("copies",))
+            raise SettingError(f"expected 1 to {MOST_COPIES} copies, found {self.copies}", ("copies",))
         if self.weight != 1.0:
             raise SettingError('applies only inside segments whose order is "drawn"', ("weight",))
         for path, given in self.leaves():

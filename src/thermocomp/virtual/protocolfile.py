@@ -97,9 +97,9 @@ def _check_types(value: Any, path: Keys) -> None:
         if key in SWITCHES and not isinstance(value, bool):
             raise SettingError("must be true or false, without quotes", path)
         if isinstance(value, bool) and key not in SWITCHES:
-            raise SettingError("must not be true or false", path)
+            raise SettingError("must be a value other than true and false", path)
         if isinstance(value, str) and key not in TEXTS and re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", value):
-            raise SettingError("write a number without quotes", path)
+            raise SettingError("write the number without quotes", path)
 
 
 def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
@@ -111,7 +111,7 @@ def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
     shared = {key: value for key, value in content.items() if key not in _OF_ALL}
     tests = content.get("tests", [{}])
     if not isinstance(tests, list) or not all(isinstance(t, dict) for t in tests):
-        raise SettingError("must be tables: [[tests]]", ("tests",))
+        raise SettingError("must be a list of tables: [[tests]]", ("tests",))
     head = {key: content[key] for key in _OF_ALL if key in content}
     return head | {"tests": [_table({**shared, **test}, ("tests", k)) for k, test in enumerate(tests)]}
 

@@ -55,7 +55,10 @@ class Lot:
             raise SettingError("write either one_of = [...], or between = [lowest, highest] and step")
         low, high = self.between
         if not (self.step > 0 and high > low) or abs(self._steps - round(self._steps)) > 1e-9:
-            raise SettingError("the range from lowest to highest must be a whole number of steps")
+            raise SettingError(
+                f"expected a range of a whole number of positive steps, found {low:g} to {high:g} in steps of "
+                f"{self.step:g}"
+            )
         if self._steps > MOST_VALUES:
             raise SettingError(
                 f"{self._steps:.3g} values to draw from, but at most {MOST_VALUES} are supported: use a larger step"
@@ -103,7 +106,11 @@ class Stroke:
         for axis in AXES:
             stroke, travel = getattr(self, axis), TRAVEL[axis]
             if stroke and not 0.0 <= stroke[0] <= stroke[1] <= travel:
-                raise SettingError(f"must increase, within the travel from 0 to {travel:g} mm", (axis,))
+                raise SettingError(
+                    f"expected positions that increase, within the travel from 0 to {travel:g} mm, found "
+                    f"{stroke[0]:g} and {stroke[1]:g} mm",
+                    (axis,),
+                )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,12 +157,12 @@ class Stretch:
 
     def __post_init__(self) -> None:
         if not 1 <= self.repeat <= MOST_REPEATS:
-            raise SettingError(f"must be from 1 to {MOST_REPEATS}", ("repeat",))
+            raise SettingError(f"expected 1 to {MOST_REPEATS} repeats, found {self.repeat}", ("repeat",))
         if not self.segments and (self.repeat > 1 or self.order != "given"):
             key = "repeat" if self.repeat > 1 else "order"
-            raise SettingError("needs segments = [...], to which it applies", (key,))
+            raise SettingError("applies to segments, but there are none: add segments = [...]", (key,))
         if not self.weight > 0:
-            raise SettingError("must be positive", ("weight",))
+            raise SettingError(f"expected a positive weight, found {self.weight:g}", ("weight",))
         for k, s in enumerate(self.segments):
             if s.weight != 1.0 and self.order != "drawn":
                 raise SettingError('applies only where the order is "drawn"', ("segments", k, "weight"))

@@ -47,7 +47,7 @@ Parameter(name="*")(ReductionOptions)
 def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
     """Reject a file where a folder is expected; the target determines the files written there."""
     if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: is not a directory")
+        raise InputError(f"{output}: this is not a directory; name a directory")
     return []
 
 

@@ -163,7 +163,7 @@ def _arithmetic(g: Graph, node: e.Node, value: Callable[[e.Node], str]) -> str: 
             return g.put("Div", 1.0, g.add(1.0, g.put("Exp", g.put("Neg", value(of)))))
         case e.Lookup(of, x, y, kind):
             return _look_up(g, value(of), Curve(x, y, kind))
-    raise TypeError(f"{node}: is not part of a formula")
+    raise TypeError(f"{node}: {type(node).__name__} has no counterpart in an ONNX graph")
 
 
 def _look_up(g: Graph, at: str, curve: Curve) -> str:

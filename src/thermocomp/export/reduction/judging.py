@@ -86,7 +86,9 @@ def reduce_model(
     if unknown := [s for s in sensors or () if s not in heat]:
         raise InputError(f"--sensors {', '.join(unknown)}: no such temperature; there are {', '.join(heat)}")
     if not heat:
-        raise InputError(f"{recordings[0].name}: no temperature, so a controller has no input to compensate from")
+        raise InputError(
+            f"{recordings[0].name}: no temperature was recorded, so the controller has no input for a compensation"
+        )
     judging, known = _judging(samples), samples.only(sensors or heat)
     taken = {"", model.target, *(c.name for c in known.inputs)}
     known = replace(known, trouble=tuple(t for t in known.trouble if t[0] in taken))

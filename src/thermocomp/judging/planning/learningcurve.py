@@ -98,10 +98,7 @@ class LearningCurve:
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
         slope = f"each of the last cycles reduced the error by {self.last_gain:.2f} um"
         if last.rms >= self.none:
-            return (
-                f"{of}, {self.none:.2f} without compensation: the model has learned nothing that applies to unseen "
-                "cycles"
-            )
+            return f"{of}, {self.none:.2f} without compensation: the model does not help on unseen cycles"
         if self.enough:
             return (
                 f"{of}; {slope}: more cycles of the same kind are not worth their time (less than {self.worth:.2f} um)"

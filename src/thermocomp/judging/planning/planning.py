@@ -86,10 +86,10 @@ class Covered:
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
         """Return the new conditions in a test, as text: speed, duration or stop."""
         if trial.kind == "room" and not self.rooms:
-            return "no temperature of the room was recorded"
+            return "no room temperature was recorded"
         if trial.kind == "room":
             most = max(self.rooms)
-            return f"the room changed by {most:.1f} degC at most" if most < 0.5 * swing else ""
+            return f"the room temperature changed by at most {most:.1f} degC" if most < 0.5 * swing else ""
         fastest = max((v for v, _, _ in self.runs), default=0.0)
         near = [run for run in self.runs if abs(run[0] - trial.speed) <= SAME * top_speed]
         if not near:
@@ -174,7 +174,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
         its effect is proposed.
     """
     if not 0 <= swing <= 50:
-        raise InputError(f"a change of the room temperature by {swing:g} degC: expected 0 to 50 degC")
+        raise InputError(f"change of the room temperature {swing:g} degC: expected 0 to 50 degC")
     doubt = find_doubt(samples)
     recorded = float(np.nanmax(np.abs(samples.values[:, doubt.speed])))
     if not recorded:

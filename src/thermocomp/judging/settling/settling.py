@@ -100,11 +100,11 @@ class Settling:
     def words(self) -> str:
         """Return cautions about the reported times, as text; empty if there are none."""
         if not self.moves:
-            return "does not move"
+            return "does not change"
         if not self.clear:
-            return "moves too little to determine a time"
+            return "changes too little to determine a time"
         if self.returns:
-            return "comes back"
+            return "returns"
         if self.overshoots:
             return "overshoots" if self.settled else "overshoots, not settled"
         return "" if self.settled else "not settled"

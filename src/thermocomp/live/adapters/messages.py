@@ -65,7 +65,7 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
         raise ReadingError(f"a measurement whose target is not a valid name: {why}")
     if max(abs(found[k] or 0.0) for k in _NUMBERS) > _FAR or (found["repeatability_um"] or 0.0) < 0.0:
         raise ReadingError(
-            f"a measurement with a number beyond {_FAR:g} um or mm, or a repeatability below 0; check the units"
+            f"a measurement with a number beyond {_FAR:g} um or mm, or with a negative repeatability; check the units"
         )
     at, measured, spread, position = (v or 0.0 for v in map(found.get, ("time", *_NUMBERS)))
     keys = [f"id {own}"] * ("id" in content) + [f"time {at!r}"] * ("time" in content)
@@ -96,7 +96,7 @@ def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     try:
         content = parse_json(payload)
     except ValueError as e:
-        raise ReadingError(f"a message that is not JSON: {escape(e, 80)}") from e
+        raise ReadingError(f"a message that is not JSON: {escape(e, 80)}; expected {example}") from e
     if not isinstance(content, dict):
         raise ReadingError(f"a message that is not a table of values: {escape(content, 40)}; expected {example}")
     for name, value in content.items():

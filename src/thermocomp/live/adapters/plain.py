@@ -61,7 +61,7 @@ class Played:
     async def readings(self) -> AsyncIterator[Reading]:
         """Return the rows as readings when they are due, up to the last one."""
         if self._rows is None:
-            raise ThermocompError("not connected")
+            raise ThermocompError("the recording is not open: connect first")
         while (row := self._next()) is not None:
             at, values = row
             if math.isnan(self._begun):
@@ -180,7 +180,7 @@ def read_rows(path: Path) -> Generator[tuple[float, dict[str, float]], None, Non
     try:
         file = path.open("rb")
     except OSError as e:
-        raise InputError(f"{path}: cannot be read: {e.strerror or e}") from e
+        raise InputError(f"{path}: the file cannot be read: {e.strerror or e}") from e
     rows = _rows_of(path, file)
     next(rows)  # consume the heading, so that faults in it are raised here
     return rows
@@ -200,7 +200,7 @@ def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, flo
         try:
             names = next(table, [])
             if "time_s" not in names:
-                raise InputError(f"{path}: has no column time_s; expected a recording written by thermocomp")
+                raise InputError(f"{path}: the file has no column time_s; expected a recording written by thermocomp")
             if why := next(filter(None, map(explain_unfit, names)), ""):
                 raise InputError(f"{path}: line {line}: {why}")
             place = names.index("time_s")
@@ -210,7 +210,7 @@ def _rows_of(path: Path, file: BinaryIO) -> Generator[tuple[float, dict[str, flo
                     found = {name: _parsed(row, k) for k, name in enumerate(names) if k != place}
                     yield at, {name: v for name, v in found.items() if v is not None}
         except (OSError, UnicodeDecodeError, csv.Error) as e:
-            raise InputError(f"{path}: line {line}: cannot be read: {e}") from e
+            raise InputError(f"{path}: line {line} cannot be read: {e}") from e
 
 
 def _parsed(row: Sequence[str], place: int) -> float | None:

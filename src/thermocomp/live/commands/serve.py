@@ -116,7 +116,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
         if not fades or fading:  # a second stop request skips the fade
             task.cancel()
             return
-        console.print("stopping: the corrections go to zero first; stop again to skip this")
+        console.print("stopping: the corrections go to zero first; interrupt again to stop immediately")
         fading.append(asyncio.create_task(service.fade_out()))
         fading[0].add_done_callback(lambda _: task.cancel())
 

@@ -184,7 +184,7 @@ class Journal:
                 return found
         found = self._attach(self._next())
         if found is None:
-            raise sqlite3.OperationalError("the new file is not a journal")
+            raise sqlite3.OperationalError("the new journal file cannot be used")
         return found
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:

@@ -213,14 +213,14 @@ def telling(path: Path) -> Iterator[None]:
     except sqlite3.Error as e:
         code = getattr(e, "sqlite_errorcode", 0) & 0xFF
         if code == sqlite3.SQLITE_NOTADB:
-            raise InputError(f"{path}: is not a journal of thermocomp, and not a database") from e
+            raise InputError(f"{path}: this is not a journal of thermocomp, and not a database") from e
         if code == sqlite3.SQLITE_CANTOPEN:
             hint = (
                 "check that you may read it; otherwise copy it, with all files whose names begin alike, to a writable "
                 "folder"
             )
-            raise InputError(f"{path}: cannot be opened; {hint}") from e
-        raise InputError(f"{path}: cannot be read ({e}); set the file aside, {_OTHERS}") from e
+            raise InputError(f"{path}: the file cannot be opened; {hint}") from e
+        raise InputError(f"{path}: the file cannot be read ({e}); set the file aside, {_OTHERS}") from e
 
 
 @contextmanager
@@ -234,7 +234,7 @@ def reading(path: Path) -> Iterator[sqlite3.Connection | None]:
     with telling(path), closing(sqlite3.connect(f"{path.resolve().as_uri()}?{how}", uri=True)) as connection:
         version = find_version(connection)
         if version is None:
-            raise InputError(f"{path}: is not a journal of thermocomp but another database")
+            raise InputError(f"{path}: this is not a journal of thermocomp but another database")
         if version > VERSION:
             raise InputError(
                 f"{path}: a journal of version {version}, but this thermocomp supports {VERSION}: read it with a "

@@ -50,8 +50,8 @@ def read_token(path: Path) -> str:
         raise InputError(f"{path}: the page's token cannot be read: {e}") from e
     if len(token) < SHORTEST:
         raise InputError(
-            f"{path}: a token of {len(token)} characters; expected at least {SHORTEST}, such as from 'openssl rand "
-            "-hex 16'"
+            f"{path}: the token has only {len(token)} characters; expected at least {SHORTEST}, for example from "
+            "'openssl rand -hex 16'"
         )
     return token
 

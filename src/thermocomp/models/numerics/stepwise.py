@@ -49,8 +49,8 @@ class FThresholds:
     def __post_init__(self) -> None:
         if not self.enter >= self.delete >= 0:
             raise InputError(
-                f"F-to-enter {self.enter} and F-to-delete {self.delete}: expected enter >= delete >= 0, "
-                "else a term could enter and leave for ever"
+                f"F-to-enter {self.enter} and F-to-delete {self.delete}: expected enter >= delete >= 0, otherwise a "
+                "term could enter and leave endlessly"
             )
 
     def enter_f(self, df: int) -> float:  # noqa: ARG002
@@ -91,7 +91,7 @@ class AlphaThresholds:
         if not 0 < self.enter <= self.remove <= 1:
             raise InputError(
                 f"alpha-to-enter {self.enter} and alpha-to-remove {self.remove}: expected 0 < enter <= remove <= 1, "
-                "else a term could enter and leave for ever"
+                "otherwise a term could enter and leave endlessly"
             )
 
     def enter_f(self, df: int) -> float:

@@ -87,8 +87,8 @@ def _run(inputs: FloatArray, dt: FloatArray, rows: slice, h: float) -> TickedRun
     time = np.cumsum(step)
     if not time[-1] / h < MOST_TICKS:
         raise InputError(
-            f"interval {h:g} s: {time[-1] / h:.3g} ticks in one test of {time[-1]:.3g} s, more than {MOST_TICKS:g}; "
-            "use a longer interval"
+            f"interval {h:g} s: {time[-1] / h:.3g} intervals in one test of {time[-1]:.3g} s, at most {MOST_TICKS:g} "
+            "are supported; use a longer interval"
         )
     share = time / h
     count = np.floor(share + EARLY).astype(np.intp)

@@ -115,8 +115,8 @@ def _checked(correlation: FloatArray, absolute: bool) -> FloatArray:
     C = np.asarray(correlation, dtype=np.float64)
     if C.ndim != 2 or C.shape[0] != C.shape[1] or not np.isfinite(C).all() or not np.array_equal(C, C.T):
         raise InputError(
-            f"correlation: expected a square, symmetric, finite matrix; found the shape {C.shape} or values that are "
-            "not"
+            f"correlation: expected a square, symmetric, finite matrix; found the shape {C.shape}, or values that "
+            "are asymmetric or not finite"
         )
     return np.abs(C) if absolute else C
 

@@ -148,7 +148,8 @@ def best_subsets(
     way: Route = route or ("adding" if problem.rank < p or adding < 2.5e-7 * 2 ** (0.47 * p) else "dropping")
     if problem.rank < p and (way == "dropping" or (max_size is None and adding > 10)):
         raise InputError(
-            f"best subsets: {p} columns of rank {problem.rank} cannot be searched by dropping; give a small max_size"
+            f"best subsets: {p} columns of rank {problem.rank} are linearly dependent, so the search cannot start "
+            "from all of them; give a small max_size, or leave dependent columns out"
         )
     search = run(problem, way, most, n_best, jobs, nodes, seconds, progress)
     ranked = []

@@ -191,7 +191,7 @@ class _Unroller:
         self, frame: _Frame, line: Line, program: Program, place: int, times: int, given: dict[Key, float] | None
     ) -> Generator[tuple[str, int], None, int | None]:
         if frame.depth >= DEEPEST:
-            raise line.fault(f"more than {DEEPEST} nested calls, which controls refuse; reduce the nesting")
+            raise line.fault(f"more than {DEEPEST} nested calls, the most that controls accept; reduce the nesting")
         if times < 1:
             raise line.fault("a call with 0 repeats; remove it")
         for _ in range(times):
@@ -260,7 +260,8 @@ class _Unroller:
             found = _LOOP.fullmatch(squeeze(read_line(text, i + 1, "fanuc").flow))
             if found and frame.program.closing(i, int(found.group("loop"))) >= place:
                 raise ProgramError(
-                    line, f"{who} jumps into a loop (line {i + 1}), which controls refuse; jump to a line outside it"
+                    line,
+                    f"{who} jumps into a loop (line {i + 1}), which controls do not accept; jump to a line outside it",
                 )
         frame.place = place
         if place < line:
@@ -332,7 +333,9 @@ class _Unroller:
         """Record that a line calls, jumps or sets a variable."""
         self._acted = True
         if line.optional:
-            raise line.fault("an optional line (/) that calls, jumps or sets a variable: give --block-delete on")
+            raise line.fault(
+                "an optional line (/) calls, jumps or sets a variable; give --block-delete on if such lines are skipped"
+            )
 
     def _step(self, line: int) -> None:
         self._steps += 1

@@ -116,8 +116,8 @@ class Follower:
         told, force = words.groups.get("motion"), self.state.modal.motion
         if told is None and force != otherwise and self._motion(words):
             raise words.error(
-                f"its motion code is {force}, from an optional line (/), or {otherwise or 'none'} if that line is "
-                "skipped; write the motion code on this line, or set --block-delete"
+                f"the motion code in force is {force}, set by an optional line (/), or {otherwise or 'none'} if that "
+                "line is skipped; write the motion code on this line, or set --block-delete"
             )
         if told is not None or force == otherwise:
             self._if_skipped = None
@@ -159,7 +159,7 @@ class Follower:
             self._move(words, block, code)
         self._after(groups, block, code, before.motion)
         if state.lathe and not all(move.rapid for move in block.moves):
-            raise modal.lathe(words, f"{state.lathe} before, and no M6")
+            raise modal.lathe(words, f"{state.lathe} on an earlier line, and no M6")
         stop = groups.get("stop")
         if stop is not None:
             block.ends = self._ended = stop not in STOPS

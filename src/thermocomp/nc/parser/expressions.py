@@ -146,13 +146,13 @@ class _Reader:
             self.place = found.end()
         return found
 
-    def error(self, missing: str) -> InputError:
+    def error(self, expected: str) -> InputError:
         rest = self.text[self.place :]
-        return InputError(f"in '{self.written}': {f'found {rest[:12]!r}' if rest else 'found the end'}, not {missing}")
+        return InputError(f"in '{self.written}': {expected}, {f'found {rest[:12]!r}' if rest else 'found the end'}")
 
     def end(self) -> None:
         if self.place < len(self.text):
-            raise self.error("the end of the value")
+            raise self.error("expected the end of the value")
 
     def expression(self) -> float:
         """Read values and operators: of two adjacent operators, the one of higher precedence is applied first."""
@@ -175,14 +175,14 @@ class _Reader:
 
     def bracket(self) -> float:
         if not self.takes("["):
-            raise self.error("'['")
+            raise self.error("expected '['")
         self.depth += 1
         if self.depth > DEEPEST:
             raise InputError(f"in '{self.written[:40]}...': more than {DEEPEST} nested brackets")
         value = self.expression()
         self.depth -= 1
         if not self.takes("]"):
-            raise self.error("']' or an operator")
+            raise self.error("expected ']' or an operator")
         return value
 
     def value(self) -> float:
@@ -201,7 +201,7 @@ class _Reader:
             return self.parameters[self.parameter()]
         if found := self.matches(_FUNCTION):
             return self.function(found.group())
-        raise self.error("a number, a parameter, a function or '['")
+        raise self.error("expected a number, a parameter, a function or '['")
 
     def parameter(self) -> Key:
         """Read the number or name of a parameter after ``#``."""
@@ -215,7 +215,7 @@ class _Reader:
         elif self.text.startswith("[", self.place):
             key = self._index(self.bracket())
         else:
-            raise self.error("a number, a <name> or '[' after '#'")
+            raise self.error("expected a number, a <name> or '[' after '#'")
         for _ in range(marks):
             key = self._index(self.parameters[key])
         return key
@@ -236,7 +236,7 @@ class _Reader:
         value = self.bracket()
         if name == "atan":
             if not self.takes("/"):
-                raise self.error("'/[' and the second value of ATAN")
+                raise self.error("expected '/[' and the second value of ATAN")
             result = math.degrees(math.atan2(value, self.bracket()))
         else:
             own = FANUC_FUNCTIONS if fanuc else FUNCTIONS
@@ -250,10 +250,10 @@ class _Reader:
 
     def _exists(self) -> float:
         if not self.takes("[#"):
-            raise self.error("'[#' after EXISTS")
+            raise self.error("expected '[#' after EXISTS")
         key = self.parameter()
         if not self.takes("]"):
-            raise self.error("']'")
+            raise self.error("expected ']'")
         if isinstance(key, int) or key in self.parameters or machine_meaning(key):
             return 1.0
         if key.startswith("_"):

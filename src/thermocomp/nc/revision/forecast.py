@@ -47,12 +47,14 @@ def read(path: str | Path) -> Forecast:
     try:
         check_file(source, FileLimits())
         if source.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{source}: exceeds {_MOST_BYTES >> 20} MiB, the limit of a forecast; remove rows")
+            raise InputError(
+                f"{source}: the file exceeds {_MOST_BYTES >> 20} MiB, the limit of a forecast; remove rows"
+            )
         text = source.read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
         raise InputError(f"{source}: no such file") from e
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(f"{source}: cannot be read as a text file: {e}") from e
+        raise InputError(f"{source}: the file cannot be read as text: {e}") from e
     lines = [
         (n, line) for n, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
     ]

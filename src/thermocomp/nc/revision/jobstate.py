@@ -30,7 +30,7 @@ class SavedJob:
 def dumps(state: JobState, written: datetime) -> str:
     """Return the text of a state file, with floats that are restored to the last bit when read."""
     if written.tzinfo is None:
-        raise InputError(f"state of a job: {written} has no time zone")
+        raise InputError(f"state of a job: time of writing {written} has no time zone")
     entry = {"written": written.astimezone(UTC).isoformat(), "state": asdict(state)}
     return jsonfile.pack(KIND, [entry])
 
@@ -39,7 +39,7 @@ def loads(text: str, source: str = "state of a job") -> SavedJob:
     """Return the state at the end of a job from the text of its file."""
     jobs: list[SavedJob] = jsonfile.unpack(KIND, SavedJob, text, source).models
     if len(jobs) > 1:
-        raise ModelFileError(f"{source}: contains the states of {len(jobs)} jobs; expected one")
+        raise ModelFileError(f"{source}: the file contains the states of {len(jobs)} jobs; expected one")
     saved = jobs[0]
     return SavedJob(saved.written.astimezone(UTC), saved.state)
 

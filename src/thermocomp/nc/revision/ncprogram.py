@@ -11,7 +11,7 @@ from thermocomp.core.exceptions import InputError
 def open_to_read(path: Path) -> TextIO:
     """Open a program for reading; lines include their endings."""
     if path.is_dir():
-        raise InputError(f"{path}: is a directory; give an NC program")
+        raise InputError(f"{path}: this is a directory; give an NC program")
     try:
         return path.open(encoding="latin-1", newline="")
     except FileNotFoundError as e:

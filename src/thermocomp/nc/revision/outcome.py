@@ -51,7 +51,7 @@ def warnings(job: Job, done: Done) -> list[str]:
     judged = [(s.axis, honest) for s in drift.stations if (honest := s.model.honest_error) is not None]
     found += [f"the model of {axis} is unproven: {honest.why}" for axis, honest in judged if honest.taken]
     found += [
-        f"the model of {axis} was judged with a stated harm margin of {honest.harm_margin:g} um"
+        f"the model of {axis} was judged with a harm margin set by the user, {honest.harm_margin:g} um"
         for axis, honest in judged
         if honest.harm_margin is not None
     ]
@@ -84,7 +84,10 @@ def explain_nothing(job: Job, done: Done) -> str:
         return f"{said}, and corrections start at {tolerance:g} um; run the original, or give a smaller --tolerance"
     if not isinstance(method, Offset):
         why = ", ".join(revision.held) or "the time between updates"
-        return f"{said}, and it was held by {why}; change that in the program, or try --method offset with --safe-z"
+        return (
+            f"{said}, and the correction was held because of {why}; change that in the program, or try --method "
+            "offset with --safe-z"
+        )
     if method.leaves_mark:
         return (
             f"{said}, but it was less than {tolerance:g} um wherever the offset could be updated; give "

@@ -85,7 +85,8 @@ def m_code_of(text: str, controller: Controller) -> int:
         raise InputError(f"--harmless {text!r}: expected an M code, such as M{101 if controller == 'linuxcnc' else 88}")
     if (code := find_code("M", float(number), controller)) is not None:
         raise InputError(
-            f"--harmless {text!r}: {code.name} is a known code ({code.does}) and is followed as such; remove the option"
+            f"--harmless {text!r}: {code.name} is a known code ({code.does}), whose effect is taken into account; "
+            "remove the option"
         )
     if controller == "linuxcnc" and not 100 <= int(number) < 200:
         raise InputError(f"--harmless {text!r}: LinuxCNC has no such code; user-defined codes are M100 to M199")

@@ -35,13 +35,15 @@ class Check:
         """Compare a block of the original with its revised lines; raise an error if the moves differ."""
         longest = max(map(len, change.texts))
         if longest > (most := max(LONGEST, len(block.line.text))):
-            raise block.error(f"would become a line of {longest} characters; at most {most} are allowed; divide it")
+            raise block.error(
+                f"the revised line would have {longest} characters; at most {most} are allowed; divide the line"
+            )
         self._texts.extend(change.texts)
         try:
             moves = [m for _ in change.texts for m in next(self._blocks).moves]
         except ProgramError as e:
             text = change.texts[-1].strip()
-            raise block.error(f"would become {text!r}, which cannot be read: {e.reason}") from e
+            raise block.error(f"the revised line {text!r} cannot be read: {e.reason}") from e
         if len(moves) != len(block.moves):
             raise _fault(block, change, f"makes {len(moves)} moves instead of {len(block.moves)}")
         for k, (was, now) in enumerate(zip(block.moves, moves, strict=True)):

@@ -184,7 +184,7 @@ class Coordinates(CorrectionMethod):
             if self._cycle:
                 raise block.error(
                     f"G91 while {block.modal.motion} is in force, whose R and {AXES[axis]} are shifted levels: write "
-                    "G80 before, and the cycle with all its words; or use --expand",
+                    "G80 before it, and the cycle with all its words; or use --expand",
                 )
         else:
             self._cycle = 0.0
@@ -223,7 +223,7 @@ class Coordinates(CorrectionMethod):
             if held and goal != wanted:
                 raise block.error(
                     f"Q divides the distance from R to {words[0]} without remainder, so that rounding decides the "
-                    "number of pecks, and R cannot be shifted because the tool is there: first write G80 and a rapid "
+                    "number of pecks; R cannot be shifted because the tool is at R: first write G80 and a rapid "
                     "above R, or use --expand",
                 )
         if goal != self._cycle or all(word in block.words for word in words):
@@ -251,8 +251,8 @@ class Coordinates(CorrectionMethod):
         for i in self.named(block):
             if self.doubtful[i]:
                 raise block.error(
-                    f"names the position of {AXES[i]}, which is unknown: a tool change or an optional line "
-                    "may have moved it; position it before, or give --block-delete off or on",
+                    f"the position of {AXES[i]} before this line is unknown: a tool change or an optional line may "
+                    "have moved the axis; position it on an earlier line, or give --block-delete off or on",
                 )
         frame = self.frame(block)
         old = frame.words(self.carried)

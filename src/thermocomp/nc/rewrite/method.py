@@ -134,8 +134,8 @@ class CorrectionMethod(ABC):
         unknown = [AXES[i] for i in self.named(block) if block.modal.absolute and not self.before[i]]
         if unknown and not ROTARY.isdisjoint(block.words) and not block.moves[-1].rapid:
             raise block.error(
-                f"turns a rotary axis at feed rate; F is in degrees only if {unknown[0]} does not move, which is "
-                f"unknown: first position {' '.join(unknown)} by a rapid",
+                f"the line turns a rotary axis at feed rate, and F is in degrees only if {unknown[0]} does not move, "
+                f"but its position before the line is unknown: first position {' '.join(unknown)} by a rapid",
             )
         return not moves and not (unknown and ROTARY.isdisjoint(block.words) and block.moves[-1].rapid)
 
@@ -180,8 +180,8 @@ class CorrectionMethod(ABC):
         fed = any(not m.rapid for m in block.moves)
         if fed and not ROTARY.isdisjoint(block.words) and any(self.carried[i] or self.doubtful[i] for i in axes):
             raise block.error(
-                "turns a rotary axis at feed rate on the way to machine coordinates, where X, Y and Z remove the "
-                "correction, so that F may no longer be in degrees; write G53 G0, or separate lines",
+                "the line turns a rotary axis at feed rate in machine coordinates; X, Y and Z then move to remove "
+                "the correction, so that F may no longer be in degrees; write G53 G0, or separate lines",
             )
         after = list(self.carried)
         for i in axes:
@@ -193,6 +193,6 @@ def refuse_probing(block: Block) -> None:
     """Raise `ProgramError` if a block probes: its result would contain an unknown correction."""
     if block.kind == "probe":
         raise block.error(
-            f"{block.modal.motion} probes: the program continues with the result, which already contains the drift; "
-            "revise the part of the program that cuts",
+            f"{block.modal.motion} probes, and the program uses the result, which already contains the drift; apply "
+            "the command revise only to the part of the program that cuts",
         )

@@ -63,8 +63,9 @@ class InputSignal:
             )
         if not all(map(math.isfinite, (*self.time, *self.values))):
             raise InputError("forecast: times and values must be finite numbers")
-        if any(not a < b for a, b in pairwise(self.time)):
-            raise InputError("forecast: the times must increase")
+        for a, b in pairwise(self.time):
+            if not a < b:
+                raise InputError(f"forecast: the times must increase, but {b:g} s follows {a:g} s")
 
     @classmethod
     def constant(cls, value: float) -> "InputSignal":
@@ -148,7 +149,7 @@ def constants(texts: Sequence[str], models: Sequence[ErrorModel]) -> dict[str, I
             raise explain_unknown("input", said, [n for n, i in inputs.items() if i.quantity != SPEED])
         channel = inputs[fitting[0]]
         if channel.quantity == SPEED:
-            raise InputError(f"constant {text!r}: the spindle speed comes from the program")
+            raise InputError(f"constant {text!r}: the spindle speed is taken from the program; remove this value")
         if channel.name in found:
             raise InputError(f"constant {text!r}: {channel.name} was given before; remove one")
         number = read_with_unit(value, channel.quantity)

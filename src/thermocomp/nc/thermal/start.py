@@ -56,7 +56,7 @@ def carry_over(stations: Sequence[Station], left: JobState, pause: float = 0.0) 
     by_name = {s.station: s for s in left.stations}
     if set(by_name) != {str(s) for s in stations}:
         raise InputError(
-            f"the last job left the state of {', '.join(by_name)}; this one has models of "
+            f"the last job saved the state of {', '.join(by_name)}, but this job has models of "
             f"{', '.join(map(str, stations))}: use the models of the last job, or start cold or measured"
         )
     mine = [by_name[str(s)] for s in stations]
@@ -180,8 +180,8 @@ def _resting(model: ErrorModel, wiring: Wiring, speed: float) -> State:
 def _restored(model: ErrorModel, saved: StationState) -> State:
     if saved.model != identity(model):
         raise InputError(
-            f"the last job left a state of another model of {saved.target}: it was fitted or altered since; start cold "
-            "or measured, or use the model of that job"
+            f"the model of {saved.target} is not the one of the last job: it was fitted again or altered since; "
+            "start cold or measured, or use the model of that job"
         )
     inputs = np.array(saved.reference)
     shape = inputs.shape
@@ -191,7 +191,7 @@ def _restored(model: ErrorModel, saved: StationState) -> State:
         shape = begun.memory.shape
         if len(saved.memory) == shape[0]:
             return begun._replace(memory=np.array(saved.memory), deviation=np.array(saved.deviation))
-    raise InputError(f"the state that the last job left of {saved.station} is not complete; start cold or measured")
+    raise InputError(f"the state of {saved.station} saved by the last job is incomplete; start cold or measured")
 
 
 def _explaining(

@@ -77,7 +77,7 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
     """
     targets = [m.target for m in models]
     if len(set(targets)) != len(targets):
-        raise InputError(f"two models for the same target among {', '.join(targets)}")
+        raise InputError(f"two models for the same target among {', '.join(targets)}; give one model per target")
     known = dict(zip(targets, models, strict=True))
     found, named = [], set()
     for text in texts or targets:
@@ -95,7 +95,7 @@ def stations(models: Sequence[ErrorModel], texts: Sequence[str] = ()) -> list[St
 def check_stations(found: Sequence[Station]) -> list[Station]:
     """Return stations ordered by axis and position."""
     if not found:
-        raise InputError("no model was given to correct a program with; give at least one")
+        raise InputError("no model was given for the correction of the program; give at least one")
     ordered = sorted(found, key=lambda s: (s.axis, s.at))
     for axis, group in groupby(ordered, key=lambda s: s.axis):
         mine = list(group)

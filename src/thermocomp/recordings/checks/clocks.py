@@ -83,7 +83,7 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
         others = len(groups[quantity]) - len(names)
         who = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
         rest = (
-            f"; the other {others} {quantity}s do not respond clearly: those of the same logger need the same shift"
+            f"; the other {others} {quantity}s show no clear response: shift those of the same logger by the same time"
             * (others > 0)
         )
         moved: dict[str, object] = {"do": "shift", "channels": names, "by_s": -shift}
@@ -165,6 +165,6 @@ def _text(who: str, shift: float) -> str:
     cannot = "before its cause" if shift < 0 else "so late and yet so sharply"
     return (
         f"the clocks of two loggers differ: the responses of {who} come about {minutes:.0f} min {way} the changes of "
-        f"the spindle speed, but heat cannot act {cannot}; shift these columns {minutes:.0f} min {remedy}, or the "
-        "speed the other way"
+        f"the spindle speed, but heat cannot act {cannot}; shift these columns {minutes:.0f} min {remedy}, or shift "
+        "the spindle speed by as much in the other direction"
     )

@@ -157,14 +157,14 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
         up = float(mine.height[min(lone)])
         text = (
             f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
-            "that no other channel shares and that comes back: delete these values"
+            "that is reversed later and that no other channel shows: delete these values"
         )
         return cut_out("trouble", channel, "step", text, np.arange(first - 1, last), time)
     more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
     text = (
-        f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shares: a sensor "
-        "or probe that was touched or came loose. Cut the test there into two files, each with its own zero, subtract "
-        "the step after it, or leave the channel out"
+        f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shows: a sensor "
+        "or probe that was touched or came loose. Split the test there into two files, each with its own zero "
+        "(reference reading), subtract the step from the values after it, or leave the channel out"
     )
     times = sorted(float(time[mine.after[j]]) for j in lone)
     zeroed = [{"do": "rezero", "channels": [channel.name], "at": t, "reason": "step"} for t in times]

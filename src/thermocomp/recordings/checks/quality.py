@@ -164,8 +164,9 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
     least, most = PLAUSIBLE[channel.quantity]
     row = int(wild[np.argmax(np.abs(values[wild]))])
     text = (
-        f"{count(wild.size, 'value')} of {len(values)} outside {least:g} to {most:g} {channel.unit}, the most extreme "
-        f"{values[row]:g} at {at_row(row, time)}: implausible for a machine; check unit, scale, zero and sensor"
+        f"{count(wild.size, 'value')} of {len(values)} outside {least:g} to {most:g} {channel.unit}, the most "
+        f"extreme {values[row]:g} at {at_row(row, time)}: implausible for a machine; check unit, scale, zero and "
+        "sensor"
     )
     if wild.size == np.isfinite(values).sum():
         return Finding("trouble", channel.name, "implausible", text)
@@ -175,7 +176,9 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
 def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
     sensed = channel.quantity in _SENSED
     advice = (
-        "check whether the sensor is connected, or leave the channel out" if sensed else "it is of no use to models"
+        "check whether the sensor is connected, or leave the channel out"
+        if sensed
+        else "a constant channel is of no use to a model"
     )
     text = f"is {x[0]:g} {channel.unit} in all {len(x)} rows; {advice}"
     gone = column(channel.name, role="ignore")
@@ -226,8 +229,9 @@ def _no_cycle(recording: Recording) -> Iterator[Finding]:
         why = "the spindle does not start again"
         if runs > 1:
             why = (
-                f"none of the spindle's {runs} starts has a stop of {SPLITS:.0f} s before it and a run of {SPLITS:.0f} "
-                "s after it (are the times minutes or hours? Then state it in a mapping: [time] unit)"
+                f"none of the {runs} spindle starts follows a standstill of at least {SPLITS:.0f} s and precedes a "
+                f"run of at least {SPLITS:.0f} s (are the times in minutes or hours? Then state the unit in a "
+                "mapping: [time] unit)"
             )
     text = (
         f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"
@@ -259,13 +263,13 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
     every = coded.sum() == np.isfinite(values).sum()
     if every:
         text = (
-            f"is {codes} in every row, a code for a missing value: the sensor is absent; leave the channel out, or "
-            f"mark the code by a mapping, missing = [{codes}]"
+            f"is {codes} in every row, a value that loggers write for a missing reading: no sensor is connected; "
+            f"leave the channel out, or declare the value in a mapping, missing = [{codes}]"
         )
     else:
         text = (
-            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, hold {codes}, a "
-            f"code for a missing value; mark it by a mapping, missing = [{codes}]"
+            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, are {codes}, "
+            f"a value that loggers write for a missing reading; declare it in a mapping, missing = [{codes}]"
         )
     rows = None if every else np.flatnonzero(coded)
     said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
@@ -284,14 +288,18 @@ def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -
         yield Finding("trouble", name, "missing values", text, remedy=column(name, role="ignore"))
         return
     if probed:
-        text = f"has {len(values) - n} values in {len(values)} rows, the same as other displacements: probing cycles"
+        text = (
+            f"has values in only {len(values) - n} of {len(values)} rows, the same rows as other displacements: "
+            "measured by probing cycles"
+        )
         yield Finding("info", name, "probed", f"{text}; models see only these rows")
         return
     starts, lengths = runs(gone)
     starts, lengths = starts[gone[starts]], lengths[gone[starts]]
     longest = int(np.argmax(lengths))
     text = (
-        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} in a row "
-        f"from {at_row(int(starts[longest]), time)}; models skip these rows: repair the sensor if there are many"
+        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} "
+        f"consecutively, from {at_row(int(starts[longest]), time)}; models skip these rows: repair the sensor if "
+        "there are many"
     )
     yield Finding("trouble" if n > 0.2 * len(values) else "warning", name, "missing values", text)

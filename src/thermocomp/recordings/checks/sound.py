@@ -29,7 +29,10 @@ def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
                             table[mine[hit], j] = np.nan
             called = samples.test_names[k] if part is recording else part.name
             trouble += [
-                (named.get(f.channel, ""), f"{called}: {f.channel or 'the recording'} has trouble ({f.kind})")
+                (
+                    named.get(f.channel, ""),
+                    f"{called}: data-quality problem in {f.channel or 'the recording'} ({f.kind})",
+                )
                 for f in lasting_trouble(findings)
                 if not f.channel or f.channel in named
             ]

@@ -42,7 +42,7 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
             continue
         k = hits[0]
         first, last = int(rows[starts[k]]), int(rows[starts[k] + lengths[k] - 1])
-        more = f", one of {len(hits)} such stretches" if len(hits) > 1 else ""
+        more = f", one of {len(hits)} such periods" if len(hits) > 1 else ""
         text = (
             f"is constant at {x[starts[k]]:.6g} {channel.unit} for {lengths[k]} rows, from {at_row(first, time)} to "
             f"{at_row(last, time)}{more}, although it varies from row to row before or after; check the sensor, then "

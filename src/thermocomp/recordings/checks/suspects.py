@@ -59,8 +59,9 @@ def _rank_correlation(a: Signal, b: Signal) -> float:
 
 def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: float) -> Finding:
     text = (
-        f"lies between {low:.4g} and {high:.4g} degC all the time, which no machine does; as {unit} its lowest value "
-        f'would be {coldest:.1f} degC. If so, state it in a mapping: unit = "{unit}"'
+        f"lies between {low:.4g} and {high:.4g} degC all the time, which is implausible for a machine; read in "
+        f"{unit}, its lowest value would be {coldest:.1f} degC. If the values are in {unit}, state it in a mapping: "
+        f'unit = "{unit}"'
     )
     return Finding("trouble", signal.channel.name, "unit", text, remedy=column(signal.channel.name, unit=unit))
 
@@ -85,16 +86,16 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
     for name, width in moving.items():
         if width > FAR:
             text = (
-                f"moves by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are these um, or nm? "
-                'Then state it in a mapping: unit = "um"'
+                f"changes by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are the values "
+                'in um or nm? Then state it in a mapping: unit = "um"'
             )
             yield Finding("trouble", name, "unit", text, remedy=column(name, unit="um"))
         if width >= 0.3 and not all_of_them:
             continue
-        against = f" while a temperature moves by {warming:.3g} degC" if np.isfinite(warming) else ""
+        against = f" while a temperature changes by {warming:.3g} degC" if np.isfinite(warming) else ""
         text = (
-            f"moves by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are these mm? Then "
-            'state it in a mapping: unit = "mm"; otherwise the probe is not in contact'
+            f"changes by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are the values "
+            'in mm? Then state it in a mapping: unit = "mm"; otherwise the probe is not in contact'
         )
         severity: Severity = "trouble" if warming >= 1 else "warning"
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
@@ -124,12 +125,12 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Find
     if interval > 3600:
         told = f"rows are {interval:.6g} s ({interval / 3600:.3g} h) apart"
     elif fastest > 86400:
-        told = f"most temperatures take over {fastest / 86400:.3g} days for half of their range"
+        told = f"most temperatures take more than {fastest / 86400:.3g} days for half of their range"
     else:
         return
     text = (
-        f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is as slow. Are the "
-        'times ms? Then state it in a mapping: [time] unit = "ms"'
+        f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is that slow. Are the "
+        'times in ms? Then state it in a mapping: [time] unit = "ms"'
     )
     yield Finding("trouble", "", "time unit", text, remedy={"time": {"unit": "ms"}})
 
@@ -169,9 +170,9 @@ def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
         if abs(start) > max(2.0, 0.05 * s.span, 6 * s.noise):
             unit = s.channel.unit
             text = (
-                f"starts at {start:.3g} {unit}, not near its zero; models assume zero at the start. If the test is the "
-                "continuation of another, join them; otherwise use its first value as zero in a mapping: zero = "
-                '"first"'
+                f"starts at {start:.3g} {unit}, not near zero; models assume a probe zeroed at the start. If the "
+                "test continues another one, join the two files; otherwise take its first value as zero, in a "
+                'mapping: zero = "first"'
             )
             row = int(s.rows[0])
             zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(time[row]), "to": 0.0}

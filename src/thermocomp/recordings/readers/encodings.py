@@ -40,7 +40,8 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
             data = data.decode(encoding).removeprefix("\ufeff").encode()
         except UnicodeError as e:
             raise RecordingError(
-                f"{path}: is written in UTF-16, but damaged ({e}); save it as UTF-8 (in a spreadsheet: CSV UTF-8)"
+                f"{path}: the file is written in UTF-16, but damaged ({e}); save it as UTF-8 (in a spreadsheet: CSV "
+                "UTF-8)"
             ) from e
         notes = (f"written in {encoding.upper()}",)
     if _LONE_CR.search(data):

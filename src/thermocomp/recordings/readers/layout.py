@@ -119,12 +119,12 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
     between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
     if above:
-        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} passed over")
+        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} skipped")
     if between:
         places = ", ".join(map(str, between))
         found.append(
             f"between the headings and the table {word}{'s' * (len(between) > 1)} {places} "
-            f"{'is' if len(between) == 1 else 'are'} passed over"
+            f"{'is' if len(between) == 1 else 'are'} skipped"
         )
     if layout.units != layout.heading:
         found.append(f"{word} {numbers[layout.units]} holds the units")
@@ -134,12 +134,12 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
 def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
     """Return a note for the user on the lines that repeat the headings."""
     places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
-    return (f"the headings come again, passed over, in line {places}",) if lines else ()
+    return (f"the headings are repeated in line {places}; skipped",) if lines else ()
 
 
 def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
     """Return a note for the user on the rows omitted at the end of a file."""
-    what = "is no row" if len(numbers) == 1 else "are no rows"
+    what = "is not part" if len(numbers) == 1 else "are not part"
     return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
 
 

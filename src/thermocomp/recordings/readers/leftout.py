@@ -44,7 +44,7 @@ def why_left_out(heading: str) -> str:
             f"unit, or {ignore}"
         )
     if meant.quantity == "time":
-        return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is no time"
+        return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is not a time"
     return (
         f"{heading!r}: {symbol!r} is read as a unit of {meant.quantity} only with a mapping; write {mapped} role = "
         f'"{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'

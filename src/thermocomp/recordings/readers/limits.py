@@ -63,7 +63,7 @@ class FileLimits:
     columns: int = _limit(10_000, "columns")
     rows: int = _limit(100_000_000, "rows")
     cells: int = _limit(500_000_000, "cells")
-    skipped_lines: int = _limit(1_000_000, "lines that are no rows (comments, blank lines)")
+    skipped_lines: int = _limit(1_000_000, "lines without data (comments, blank lines)")
     sheets: int = _limit(100, "sheets")
     sheet_rows: int = _limit(1_048_576, "rows of a sheet")
     row_elements: int = _limit(200_000, "XML elements in one row or one other part of the workbook")
@@ -81,8 +81,8 @@ class FileLimits:
         if found > most:
             counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
             raise RecordingError(
-                f"{where}: over {most:,} {counts} (at least {found:,}), more than are read: delete what is not part of "
-                f"the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
+                f"{where}: over {most:,} {counts}, which is the limit; found at least {found:,}: delete what is not "
+                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:
@@ -108,5 +108,5 @@ def check_file(path: Path, limits: FileLimits) -> None:
     """Reject a path that is not a regular file, such as a pipe or a device (also through a link), or a large file."""
     found = path.stat()
     if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening a folder raises a clear error
-        raise RecordingError(f"{path}: is a pipe or a device, not a file; save its output to a file")
+        raise RecordingError(f"{path}: this is a pipe or a device, not a file; save its output to a file")
     limits.check("file_bytes", found.st_size, path)

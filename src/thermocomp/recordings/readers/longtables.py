@@ -43,7 +43,7 @@ def read_long(path: str | Path, mapping: Mapping | None, options: ProfileOptions
     most = int(np.bincount(number).max())
     if len(points) > 2 * most:
         raise RecordingError(
-            f"{owner}: {len(points)} different places in all, but at most {most} in one thermal state: give the "
+            f"{owner}: {len(points)} different positions in all, but at most {most} in one thermal state: give the "
             "commanded positions, which are the same in every state"
         )
     index = {tuple(p): k for k, p in enumerate(points.tolist())}
@@ -83,7 +83,11 @@ def _error_column(rows: Rows, wanted: str, unit: str, owner: str) -> str:
         return name
     names = [c.name for c in rows.channels if c.quantity == QUANTITY[unit]]
     if len(names) != 1:
-        said = f"there are {', '.join(names)}: state which" if names else f"there is none: name one like error_{unit}"
+        said = (
+            f"there are {', '.join(names)}: specify one of them"
+            if names
+            else f"there is none: name one like error_{unit}"
+        )
         raise RecordingError(f"{owner}: expected one column of {QUANTITY[unit]}s; {said}")
     _refuse_mixed(rows, names[0], unit, owner)
     return names[0]
@@ -151,7 +155,7 @@ def _refuse_unsorted(rows: Rows, at: FloatArray, state: IntArray, own: int, colu
         line = tuple(np.delete(point, own).tolist())
         before = last.get(line, -np.inf)
         if point[own] <= before:
-            what = "comes twice" if point[own] == before else f"follows {before:g} mm"
+            what = "occurs twice" if point[own] == before else f"follows {before:g} mm"
             raise RecordingError(
                 f"{rows.source}: {rows.place(k)}, column {column!r}: {point[own]:g} mm {what} in one thermal state, "
                 "but positions must increase: sort the rows, average repeated measurements, or separate the states "

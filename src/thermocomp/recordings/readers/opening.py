@@ -26,7 +26,8 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
     ending = path.suffix.lower()
     if ending not in _OPEN:
         raise RecordingError(
-            f"{path}: files ending in {ending or 'nothing'!r} cannot be read; save it as one of {', '.join(_OPEN)}"
+            f"{path}: files with the extension {ending or 'none'!r} cannot be read; save it as one of "
+            f"{', '.join(_OPEN)}"
         )
     try:
         check_file(path, mapping.limits)
@@ -38,9 +39,9 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
         near = get_close_matches(path.name, others, n=1)
         raise RecordingError(f"{path}: no such file{f'; did you mean {near[0]}?' if near else ''}") from e
     except OSError as e:
-        raise RecordingError(f"{path}: cannot be read: {e.strerror or e}") from e
+        raise RecordingError(f"{path}: the file cannot be read: {e.strerror or e}") from e
     except ValueError as e:  # an invalid file name
-        raise RecordingError(f"{str(path)!r}: cannot be read: {e}") from e
+        raise RecordingError(f"{str(path)!r} cannot be read: {e}") from e
 
 
 def read_embedded(text: str, source: Path) -> tuple[Mapping, list[str]]:

@@ -105,7 +105,9 @@ class ParquetTable(FileTable):
                         parts[k].append(cells)
                 row = stop
         if row != self.n_rows:
-            raise RecordingError(f"{self.path}: declares {self.n_rows} rows but contains {row}; write it again")
+            raise RecordingError(
+                f"{self.path}: the file declares {self.n_rows} rows but contains {row}; write it again"
+            )
         columns = {k: pd.concat(p, ignore_index=True) for k, p in parts.items()}
         numbered, notes = convert_all(self, {k: columns[k] for k in written}, self.decimal)
         data = {**columns, **values, **numbered}
@@ -136,7 +138,7 @@ def _translated(path: Path) -> Iterator[None]:
         raise
     except Exception as e:
         raise RecordingError(
-            f"{path}: is not a Parquet file, or a damaged one ({type(e).__name__}: {e}); write it again"
+            f"{path}: this is not a Parquet file, or a damaged one ({type(e).__name__}: {e}); write it again"
         ) from e
 
 

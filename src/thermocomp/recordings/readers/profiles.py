@@ -71,8 +71,8 @@ def read_components(
             if code not in codes(r):
                 like = f"{code or 'EXX'}_250_{BY_CODE[code].unit if code in BY_CODE else 'um'}"
                 raise RecordingError(
-                    f"{r.source}: no column is named after {code or 'a component'}, such as {like} (position in mm, "
-                    "unit); columns of other names are read one component at a time"
+                    f"{r.source}: no column is named after {code or 'an error component'}, such as {like} (position "
+                    "in mm, unit); if the columns have other names, read one component at a time"
                 )
     return {code: tuple(from_recording(r, code) for r in recordings) for code in wanted}
 
@@ -91,7 +91,10 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
     elif called:
         found = [(recording.channel(name), {axis: p}) for name, p in called.items()]
         if elsewhere:
-            why = "at another position, angular errors have a lever arm: subtract their effect, and read a long table"
+            why = (
+                "at another position, angular errors act through a lever arm: subtract their effect, and read a "
+                "long table"
+            )
             notes += (f"{NOT_TAKEN} {elsewhere[0]} to {elsewhere[-1]}: {why}",)
     else:
         found = [(c, {axis: p}) for c, p in _by_name(recording, QUANTITY[unit], owner)]
@@ -112,7 +115,9 @@ def from_recording(recording: Recording, options: ProfileOptions | str) -> Profi
         )
     for channel, place in found:
         if axis not in place:
-            raise InputError(f"{owner}: column {channel.name!r}: its entry does not specify the position of {axis}")
+            raise InputError(
+                f"{owner}: column {channel.name!r}: its entry in [positions] does not give the position of {axis}"
+            )
     points = np.array([[place.get(a, 0.0) for a in "XYZ"] for _, place in found])
     taken = [c for c, _ in found]
     rest = tuple(c for c in recording.channels if c not in taken and not (called and is_profile(c)))
@@ -149,7 +154,7 @@ def _read_place(value: Any, where: str) -> Place:
         try:
             position = read_with_unit(text, "position")
         except UnitError as e:
-            raise UnitError(f"{where}.{axis}: {e}") from e
+            raise UnitError(f"{where}.{axis} = {text!r}: {e}") from e
         if position is None:
             raise InputError(f'{where}.{axis} = {text!r}: write a position with its unit, such as "250 mm"')
         place[axis.upper()] = position
@@ -195,6 +200,6 @@ def _refuse_another_axis(target: str, axis: str, found: Sequence[tuple[Channel, 
         called = re.match(r"([xyz])(?:\d?_)", c.name)
         if called and target in BY_CODE and called[1].upper() not in (axis, target[1]):
             raise RecordingError(
-                f"{owner}: columns like {c.name!r} seem to be of {called[1].upper()}, not of {target}; state which "
-                "columns to use if they are meant"
+                f"{owner}: columns like {c.name!r} seem to contain {called[1].upper()}, not {target}; if they are "
+                "nevertheless meant, specify the columns to use"
             )

@@ -103,7 +103,7 @@ class CsvTable(FileTable):
             types = text if decimal else {**text, **dict.fromkeys(numbers, str)}
             frame = self._read_frame({**dict.fromkeys(numbers), **types}, decimal=decimal or ".")
         except ValueError as e:
-            raise RecordingError(f"{self.path}: cannot be read as a table: {e}") from e
+            raise RecordingError(f"{self.path}: the file cannot be read as a table: {e}") from e
         written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
         for k in written:
             # pandas reads True as a number
@@ -125,11 +125,11 @@ class CsvTable(FileTable):
             ) as chunks:
                 frame: pd.DataFrame = pd.concat(chunks, ignore_index=True)
         except IndexError as e:  # the file ends within a cell
-            raise ValueError("it contains no rows") from e
+            raise ValueError("the file contains no rows") from e
         except UnicodeDecodeError as e:
             raise RecordingError(
-                f"{self.path}: is not written in {self.encoding} ({e.reason}); specify the correct encoding in a "
-                "mapping, [read] encoding"
+                f"{self.path}: the file is not written in {self.encoding} ({e.reason}); specify the correct encoding "
+                "in a mapping, [read] encoding"
             ) from e
         if len(frame) != self.n_rows:
             raise RecordingError(

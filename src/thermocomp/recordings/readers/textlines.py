@@ -120,8 +120,8 @@ def open_lines(path: Path, data: bytes | None, options: ReadOptions, limits: Fil
             kind = "" if last else next((k for magic, k in _KINDS.items() if block.startswith(magic)), "")
             if kind or b"\x00" in block:
                 raise RecordingError(
-                    f"{path}: is not text but {kind or 'binary'}; export the recording as CSV, or correct the file "
-                    "extension"
+                    f"{path}: the file is not text but {kind or 'binary'}; export the recording as CSV, or correct "
+                    "the file extension"
                 )
             returns += block.count(b"\r") - block.count(b"\r\n") - (last == b"\r" and block.startswith(b"\n"))
             last = block[-1:]

@@ -27,7 +27,7 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     """
     is_stamp, table = file.is_stamp, file.table
     row, local = int(wrong[0]), is_stamp and pd.Timestamp(start).tzinfo is None
-    what = "comes twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
+    what = "occurs twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
     more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
     text = f"{file.at(row)}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
     steps = np.diff(time)

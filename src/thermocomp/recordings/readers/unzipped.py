@@ -78,5 +78,5 @@ class _Survey:
 
     def _doctype(self, *_: object) -> None:
         raise RecordingError(
-            f"{self.where}: defines entities or a document type, as no spreadsheet does; save the file again"
+            f"{self.where}: the file defines entities or a document type, as no spreadsheet does; save it again"
         )

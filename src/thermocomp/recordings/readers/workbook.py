@@ -65,7 +65,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
         raise
     except Exception as e:  # any error that a damaged file causes in two parsers
         raise RecordingError(
-            f"{path}: is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it again"
+            f"{path}: this is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it again"
         ) from e
 
 
@@ -78,7 +78,9 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
         return options.sheet, ()
     first = next(iter(sheets), None)
     if first is None:
-        raise RecordingError(f"{path}: has no sheet with cells; a recording has a heading row and rows of numbers")
+        raise RecordingError(
+            f"{path}: the workbook has no sheet with cells; a recording has a heading row and rows of numbers"
+        )
     if len(sheets) == 1:
         return first, ()
     likely = []

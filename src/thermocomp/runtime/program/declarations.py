@@ -123,5 +123,5 @@ class Record:
 
         def __setattr__(self, name: str, value: object) -> None:
             if not isinstance(inspect.getattr_static(self, name, None), Var):
-                raise TypeError(f"{name}: is not a variable of {type(self).__name__}")
+                raise TypeError(f"{name} is not a declared variable of {type(self).__name__}")
             super().__setattr__(name, value)

@@ -29,7 +29,7 @@ def let(name: str, value: V) -> V:
     recording = TRACE.get()
     kind = value.node.kind
     if recording.locals.setdefault(name, kind) != kind:
-        raise TypeError(f"{name}: declared as {recording.locals[name]} and as {kind}")
+        raise TypeError(f"local variable {name} is declared with two types, {recording.locals[name]} and {kind}")
     variable = type(value)(n.Name(kind, name))
     variable._assign(value.node)
     return variable
@@ -58,7 +58,7 @@ def _last_branch() -> n.If:
     while isinstance(last, n.If) and last.other:
         last = last.other[0]
     if not isinstance(last, n.If):
-        raise TypeError("`otherwise` must follow `when`")
+        raise TypeError("`otherwise` must directly follow a `when` block")
     return last
 
 

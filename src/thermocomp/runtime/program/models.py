@@ -129,7 +129,7 @@ class _Arithmetic:
                 return abs(self.value(of))
             case e.Sigmoid(of):
                 return 1.0 / (1.0 + exp(-self.value(of)))
-        raise TypeError(f"{node}: is not part of a formula")
+        raise TypeError(f"{node}: {type(node).__name__} cannot be translated into arithmetic of the controller")
 
 
 class _Formula(_Arithmetic):

@@ -53,7 +53,8 @@ def gather(compensator: Compensator) -> Tables:
     zeroings = {m.zeroing for m in models} | {w.zeroing for w in watches}
     if len(zeroings) > 1 or len(watches) > 1:
         raise InputError(
-            "the models have different watches or average their zero in different ways: export each file separately"
+            "the models have different watches (sensor monitoring) or different averaging times of the zero "
+            "(reference reading): export each model file separately"
         )
     zeroing = zeroings.pop()
     watch = watches[0] if watches else None

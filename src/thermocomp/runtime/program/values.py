@@ -18,11 +18,14 @@ class Symbol:
 
     def _assign(self, value: Expression) -> None:
         if not isinstance(self.node, n.Name | n.Element):
-            raise TypeError(f"{self.node}: cannot be assigned")
+            raise TypeError(f"{self.node} cannot be assigned to: only variables and array elements can")
         add(n.Assign(self.node, value))
 
     def __bool__(self) -> NoReturn:
-        raise TypeError("a symbol is neither true nor false: use `when`, `choose`, & and |")
+        raise TypeError(
+            "a symbolic value has no truth value before the program runs: use `when`, `choose`, & and | instead "
+            "of if, and, or"
+        )
 
 
 class Condition(Symbol):
@@ -172,7 +175,7 @@ class _Array(Symbol):
         array = cast("n.Name", self.node)
         places = at if isinstance(at, tuple) else (at,)
         if len(places) != len(array.dims):
-            raise TypeError(f"{array.name}: {len(places)} indices for {len(array.dims)} dimensions")
+            raise TypeError(f"array {array.name}: {len(places)} indices, expected {len(array.dims)}")
         return n.Element(array.kind, array, tuple(integer(k).node for k in places))
 
 

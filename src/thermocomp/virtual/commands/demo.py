@@ -33,7 +33,7 @@ def demo(
         0 done, 1 a model was refused.
     """
     if output.exists() and not output.is_dir():
-        raise InputError(f"{output}: is a file; name a folder")
+        raise InputError(f"{output}: this is a file; name a folder")
     output.mkdir(parents=True, exist_ok=True)
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)

@@ -52,7 +52,7 @@ def read(path: str | Path) -> tuple[Positioning, ...]:
     except FileNotFoundError as e:
         raise RecordingError(f"{source}: no such file") from e
     except OSError as e:
-        raise RecordingError(f"{source}: cannot be read: {e.strerror or e}") from e
+        raise RecordingError(f"{source}: the file cannot be read: {e.strerror or e}") from e
     columns = {role: k for role in NAMES if (k := _find(table, role)) is not None}
     numbers = {role: columns[role] for role in ("position", "deviation")}
     texts = {role: k for role, k in columns.items() if role not in numbers}

@@ -304,7 +304,10 @@ def _inputs(machine: Machine, recording: Recording) -> tuple[FloatArray, dict[st
     for values in table.values():
         missing |= ~np.isfinite(values)
     if missing.all():
-        raise InputError(f"{recording.source or recording.name}: in every row an input of the models is missing")
+        raise InputError(
+            f"{recording.source or recording.name}: every row lacks a value of at least one input of the models "
+            f"({', '.join(table)})"
+        )
     return recording.time, table, int(missing.sum())
 
 

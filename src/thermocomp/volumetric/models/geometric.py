@@ -160,7 +160,10 @@ def fit_profile(
     columns = taken.columns(chosen)
     n_terms = columns.shape[1]
     if np.linalg.matrix_rank(columns) < n_terms:
-        raise FitError(f"profile along {axis}: {len(np.unique(place))} points do not determine {n_terms} terms")
+        raise FitError(
+            f"profile along {axis}: {len(np.unique(place))} different points do not determine {n_terms} terms; "
+            "choose a lower order"
+        )
     found: FloatArray = np.asarray(np.linalg.lstsq(columns, values)[0], dtype=np.float64)
     left = values - columns @ found
     spare = len(values) - n_terms
@@ -187,7 +190,7 @@ def _suited(points: FloatArray, axis: str, kind: Kind, coordinates: str | None) 
         raise InputError(f"coordinates {used!r}: name the axis {axis} itself and, if required, others of X, Y, Z")
     others = "".join(a for a in used if a != axis and a in varying)
     if kind == "spline" and others and coordinates is not None:
-        raise InputError(f"a spline depends on {axis} only: for the coordinates {used} choose a polynomial")
+        raise InputError(f"a spline depends on {axis} only; choose a polynomial for the coordinates {used}")
     n_own = len(np.unique(points[:, "XYZ".index(axis)]))
     if n_own < MIN_POSITIONS:
         raise FitError(f"profile along {axis}: values at {n_own} positions; at least {MIN_POSITIONS} are needed")

@@ -189,8 +189,8 @@ def _refuse_unreached(position: FloatArray, cold: FloatArray, test: Profiles) ->
     for end in (position.min(), position.max()):
         if end not in there:
             raise FitError(
-                f"{test.target}: the cold profile has no value at {end:g} mm, where other profiles have one: name more "
-                "reference states, or omit that position"
+                f"{test.target}: the cold profile has no value at {end:g} mm, where other profiles have one: specify "
+                "more reference states, or omit that position"
             )
 
 

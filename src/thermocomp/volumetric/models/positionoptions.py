@@ -163,7 +163,7 @@ def blank_unlearned(
             kept[test.reference_rows(options.reference)] = True
             found.append(replace(test, values=np.where(kept[:, None], test.values, np.nan)))
     if not found:
-        raise FitError(f"{tests[0].target}: no state is left for training")
+        raise FitError(f"{tests[0].target}: no thermal state is left for training")
     return tuple(found)
 
 

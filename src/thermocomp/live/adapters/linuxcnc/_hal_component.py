@@ -240,14 +240,16 @@ class Server:
         for name in ("magnitude", "rate"):
             value = float(message.get(name, getattr(self.options, name)))
             if not 0.0 < value < math.inf:
-                raise ValueError(f"{name}: expected a positive finite number")
+                raise ValueError(f"{name} = {value}: expected a positive finite number")
             limits[name] = min(value, getattr(self.options, name))
         lines = {letter: [float(v) for v in line] for letter, line in message.get("axes", {}).items()}
         for letter, line in lines.items():
             if letter not in self.axes:
-                raise ValueError(f"there is no axis {letter} here, only {', '.join(self.axes)}")
+                raise ValueError(f"axis {letter} is not corrected here, only {', '.join(self.axes)}")
             if len(line) != 3 or not all(map(math.isfinite, line)):
-                raise ValueError(f"axis {letter}: expected three finite numbers")
+                raise ValueError(
+                    f"axis {letter}: {line}: expected three finite numbers (offset, slope, reference position)"
+                )
         beat = int(message["beat"])
         self.heard = time.monotonic()
         self.magnitude, self.rate = limits["magnitude"], limits["rate"]

@@ -180,7 +180,7 @@ class LinuxCncSink:
     async def _hear(self, line: bytes) -> None:
         """Send a line and process the answer; close the connection unless the answer matches."""
         if self._streams is None:
-            raise self._fail("not connected")
+            raise self._fail("the service is not connected to LinuxCNC")
         reader, writer = self._streams
         heard = False
         try:
@@ -199,7 +199,7 @@ class LinuxCncSink:
         except (OSError, TimeoutError, ValueError, LookupError, AttributeError, TypeError, OverflowError) as e:
             raise self._fail(str(e) or "no answer") from e
         except (RecursionError, ThermocompError) as e:
-            raise self._fail(f"unexpected answer: {e}") from e
+            raise self._fail(f"the answer of LinuxCNC is not as expected: {e}") from e
         finally:  # also if cancelled: a late answer would be taken as the reply to the next message
             if not heard:
                 await self._hang_up()

@@ -145,7 +145,9 @@ def expand(
                     acts = compare(asked, done)
                 compare_parameters(*left)
             except ProgramError as error:
-                raise ProgramError(error.line, f"it cannot be expanded: {error.reason}") from error
+                raise ProgramError(
+                    error.line, f"the program cannot be written as plain lines: {error.reason}"
+                ) from error
     return Expansion(out, sources, acts)
 
 
@@ -171,7 +173,7 @@ def _lines(path: Path, around: _Around) -> Iterator[tuple[str, int]]:
     with closing(around.run(path, one, opened=opened)) as run1, closing(around.run(path, two, task=True)) as run2:
         for first, second in zip_longest(_told(run1, writer.sides[0]), _told(run2, writer.sides[1])):
             if first is None or second is None:
-                raise writer.refuse(f"its end position {DEPENDS}")
+                raise writer.refuse(f"the end position of the program {DEPENDS}; set it in the program first")
             if first.kind == "end" and not first.file and _REPEATS.search(_code(writer.source(first.line))):
                 raise ProgramError(first.line, "M99 in a main program repeats it endlessly: end it with M2 or M30")
             yield from writer.write(first, second)
@@ -209,7 +211,7 @@ def _refuse_lost(file: Path, program: Path, block_delete: bool, *, radii: bool) 
     for code, reason in reasons.items():
         for number in _lines_with(code, file, block_delete):
             where = "" if own else f" (line {number} of {file.name})"
-            raise ProgramError(number if own else 1, f"it cannot be expanded: {reason}{where}")
+            raise ProgramError(number if own else 1, f"the program cannot be written as plain lines: {reason}{where}")
 
 
 def _lines_with(code: re.Pattern[str], file: Path, block_delete: bool) -> Iterator[int]:

@@ -107,7 +107,10 @@ class OriginWriter:
 
     def refuse(self, reason: str, file: str = "") -> ProgramError:
         """Return an error for the line being run; in a subprogram in another file, for the last line of the program."""
-        return ProgramError(max(self.line, 1), f"it cannot be expanded: {reason}" + (f" (in {file})" if file else ""))
+        return ProgramError(
+            max(self.line, 1),
+            f"the program cannot be written as plain lines: {reason}" + (f" (in {file})" if file else ""),
+        )
 
     def chosen_system(
         self, a: Canonical, b: Canonical, angles: tuple[float, float] | None, source: str
@@ -121,7 +124,7 @@ class OriginWriter:
         """
         index, chosen = int(a.values[0]), self.sides[0].frame.system
         if index != int(b.values[0]):
-            raise self.refuse(f"the work coordinate system {DEPENDS}")
+            raise self.refuse(f"the work coordinate system {DEPENDS}; set it in the program first")
         changed: set[int] = set()
         turned = False
         for side, call, angle in zip(self.sides, (a, b), angles or (None, None), strict=True):
@@ -140,10 +143,10 @@ class OriginWriter:
             elif agree(first.program[i], second.program[i]):
                 here.append(self.words.axis(i, first.program[i]))
             else:
-                raise self.refuse(f"the origin of {AXES[i]} {DEPENDS}")
+                raise self.refuse(f"the origin of {AXES[i]} {DEPENDS}; set it in the program first")
         if turned:
             if not agree(first.frame.rotation, second.frame.rotation):
-                raise self.refuse(f"the rotation of the work coordinate system {DEPENDS}")
+                raise self.refuse(f"the rotation of the work coordinate system {DEPENDS}; set it in the program first")
             fixed.append(f"R{format_number(first.frame.rotation)}")
         # P0 is the system in force; the system in force here may differ from that of the machine
         place = 0 if _ACTIVE.search(_bare(source)) else index
@@ -159,8 +162,8 @@ class OriginWriter:
         text = _bare(source)
         if not PLAIN_G10.fullmatch(text):
             raise self.refuse(
-                "the origin of a work coordinate system that is not in force is set by more than plain numbers; select "
-                "that system before (G54 ...), or write the numbers"
+                "the origin of a work coordinate system that is not in force is set by expressions; select that "
+                "system before (G54 ...), or write plain numbers"
             )
         index = int(text[text.index("P") + 1])
         for letter, value in re.findall(r"([XYZABC])([-+]?[\d.]+)", text):
@@ -189,9 +192,9 @@ class OriginWriter:
             elif agree(now[0][i], now[1][i]):
                 fixed.append(self.words.axis(i, now[0][i]))
             else:
-                raise self.refuse(f"the shift of {AXES[i]} by G92 {DEPENDS}")
+                raise self.refuse(f"the shift of {AXES[i]} by G92 {DEPENDS}; set it in the program first")
         if named and fixed:
-            raise self.refuse(f"the shifts by G92 {DEPENDS}")
+            raise self.refuse(f"the shifts by G92 {DEPENDS}; set it in the program first")
         return f"G92 {' '.join(named)}" if named else f"G52 {' '.join(fixed)}" if fixed else ""
 
     def tool_length(self) -> str:
@@ -208,7 +211,7 @@ class OriginWriter:
                 return "G43"  # of the tool in the spindle at the start, whatever its number
         if all(agree(x, y) for x, y in zip(first, second, strict=True)) and not any(first[3:]):
             return f"G43.1 {' '.join(self.words.axis(i, first[i]) for i in range(3))}"
-        raise self.refuse(f"the tool length in force {DEPENDS}")
+        raise self.refuse(f"the tool length in force {DEPENDS}; set it in the program first")
 
 
 def _bare(source: str) -> str:

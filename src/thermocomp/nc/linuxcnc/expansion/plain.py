@@ -76,7 +76,7 @@ class Writer(OriginWriter):
             self.line = line if first.file or second.file else min(line, second.line)
             raise self.refuse(
                 f"the path of execution {DEPENDS}: a branch or a loop uses a parameter, an origin or a position that "
-                "the program has not set; set it first",
+                "the program has not set; set it in the program first",
                 first.file,
             )
         merged = False
@@ -164,13 +164,18 @@ class Writer(OriginWriter):
                 yield kind, self.shift(old, "" if a.file else self.source(a.line))
         elif kind in {"comment", "message"}:
             if a.text != b.text:
-                raise self.refuse(f"this message {DEPENDS}", a.file)
+                raise self.refuse(
+                    "the values in this message depend on what is stored in the machine; set them in the program first",
+                    a.file,
+                )
             text = a.text.replace("(", "[").replace(")", "]")
             yield kind, f"(MSG,{text})" if kind == "message" else f"({text})"
         elif kind == "feedrate":
             self.feed = a.values[1] if agree(a.values[1], b.values[1]) else None
         elif not all(agree(x, y) for x, y in zip(a.values, b.values, strict=True)):
-            raise self.refuse(f"{kind} {' '.join(map(format_number, a.values))} {DEPENDS}", a.file)
+            raise self.refuse(
+                f"{kind} {' '.join(map(format_number, a.values))} {DEPENDS}; set it in the program first", a.file
+            )
         else:
             yield from self.state(a)
 
@@ -220,7 +225,7 @@ class Writer(OriginWriter):
                 yield f"{self.code(a)} {' '.join(words)}{self.feed_word(a)}"
             self.pieces += self.pitch != 0.0
         elif a.arc:
-            raise self.refuse(f"the start or end of this arc {DEPENDS}")
+            raise self.refuse(f"the start or end of this arc {DEPENDS}; set it in the program first")
         else:
             yield from self.machine_move(a, b)
         first.move(pa)
@@ -233,7 +238,7 @@ class Writer(OriginWriter):
             if agree(first, second):
                 words += " " + self.words.axis(i, first)
             elif not self.still(i, first, second):
-                raise self.refuse(f"the position of the tapped hole {DEPENDS}")
+                raise self.refuse(f"the position of the tapped hole {DEPENDS}; set it in the program first")
         scale = "" if a.values[3] == 1 else f" I{format_number(a.values[3])}"
         self.pieces += 1
         return f"G33.1{words} K{self.words.length(self.pitch)}{scale}"
@@ -289,12 +294,12 @@ class Writer(OriginWriter):
         assert b.arc is not None
         i, j, _ = PLANE_AXES[a.arc.plane]
         if self.pitch or a.arc.turns == 0 or a.arc[0] != b.arc[0] or a.arc.turns != b.arc.turns:
-            raise self.refuse(f"the direction of this arc {DEPENDS}")
+            raise self.refuse(f"the direction of this arc {DEPENDS}; set it in the program first")
         centre = ""
         for axis, letter in zip((i, j), CENTRES[a.arc.plane], strict=True):
             starts = [side.program[axis] for side in self.sides]
             if not (known[axis] and agree(*starts) and agree(a.arc.centre[axis], b.arc.centre[axis])):
-                raise self.refuse(f"the start or end of this arc {DEPENDS}")
+                raise self.refuse(f"the start or end of this arc {DEPENDS}; set it in the program first")
             # relative to the start as written, so that rounding errors do not accumulate
             centre += f" {letter}{self.words.length(a.arc.centre[axis] - self.words.rounded(starts[0]))}"
         words = " ".join(self.words.axis(axis, a.program[axis]) for axis in range(9) if known[axis])
@@ -310,7 +315,7 @@ class Writer(OriginWriter):
         start = self.sides[0].program[:2], self.sides[1].program[:2]
         agreed = all(agree(x, y) for x, y in zip((*a.values, *start[0]), (*b.values, *start[1]), strict=True))
         if not agreed:
-            raise self.refuse(f"the path of this curve {DEPENDS}")
+            raise self.refuse(f"the path of this curve {DEPENDS}; set it in the program first")
         if order not in {3, 4} or len(points) != order or any(p[2] != 1 for p in points):
             raise self.refuse("splines of G5.2 have no equivalent in plain codes")
         (x0, y0), end = map(self.words.rounded, start[0]), [self.words.rounded(v) for v in points[-1][:2]]
@@ -327,7 +332,7 @@ class Writer(OriginWriter):
         if call.kind == "rapid" or self.pitch:
             return ""
         if self.feed is None:
-            raise self.refuse(f"the feed {DEPENDS}")
+            raise self.refuse(f"the feed {DEPENDS}; set it in the program first")
         if self.feed == self.written_feed:
             return ""
         self.written_feed = self.feed

@@ -55,7 +55,9 @@ def compare(asked: Iterator[Canonical], done: Iterator[Canonical]) -> int:
             words = [act.told() if act else "nothing" for act in (first, second)]
             if first and second and words[0] == words[1]:
                 words = [f"{word} with {act.state}" for word, act in zip(words, (first, second), strict=True)]
-            raise ProgramError(max(line, 1), f"the plain lines would do: {words[1]}, instead of: {words[0]}")
+            raise ProgramError(
+                max(line, 1), f"the plain lines would not do the same as the program: {words[1]} instead of {words[0]}"
+            )
         count += 1
     return count
 

@@ -221,8 +221,8 @@ def _fault(proving: _Proving, number: int, drawn: set[str], error: ProgramError)
         remedies = f"a correction of X or Y turns with the rotation of its work coordinate system; {remedies}"
     return ProgramError(
         error.line,
-        f"{what}, in a controller with other values of {names}: not stated, so the program cannot be proved; "
-        f"{remedies}",
+        f"{what}, in a controller with other values of {names}; these were not stated, so the program cannot be "
+        f"proved; {remedies}",
     )
 
 
