@@ -170,7 +170,7 @@ def plan(
     jobs: int = -1,
     progress: Callable[..., Any] = silent,
 ) -> Planned:
-    """Determine how much testing is sufficient, and write the most informative next test as an NC program.
+    """Determine whether more tests are needed, and write the most informative next test as an NC program.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def plan(
     hours : float
         Duration of the next test [h].
     swing : float
-        Largest change of the ambient temperature at the machine within that time [degC]; 0: none.
+        Largest change of the ambient temperature at the machine during the test [degC]; 0: none.
     inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool

@@ -45,8 +45,8 @@ def plan(
         Time between two measurements with a touch probe, for which the program stops the spindle [min]; 0: a logger
         measures continuously.
     running : bool
-        Check whether the current spindle run or stop of a test that is still running may end; the recording is that of
-        the test up to now.
+        For a test in progress, of which the recording up to now is given: check whether the current spindle run or stop
+        may end.
 
     Returns
     -------

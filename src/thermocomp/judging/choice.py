@@ -38,23 +38,24 @@ class Settings:
     Parameters
     ----------
     threshold : float
-        grouping: correlation above which a sensor joins a group.
+        For grouping: correlation above which a sensor joins a group.
     unsigned : bool
-        grouping: compare the magnitudes of correlations.
+        For grouping: compare the magnitudes of the correlations, regardless of sign.
     reference : str
-        grouping: temperature that is subtracted from the others.
+        For grouping: temperature that is subtracted from the others.
     max_sensors : int
-        subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
+        For subsets, ace and pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        subsets: approximate time limit of the search for the best sets [s]; sets not proven best by then are reported.
+        For subsets: approximate time limit of the search for the best sets [s]; the result names the sets that are not
+        proven best by then.
     criterion : str
-        subsets: criterion by which the number of sensors is chosen.
+        For subsets: criterion by which the number of sensors is chosen.
     models : list of str
-        pareto: methods that are trained on the sensors.
+        For pareto: methods fitted to each set of sensors.
     level : float
-        ace: significance level of the Wilcoxon test.
+        For ace: significance level of the Wilcoxon test.
     holm : bool
-        ace: correct the significance level for the number of tests.
+        For ace: correct the significance level for the number of tests (Holm).
     """
 
     threshold: float = 0.9

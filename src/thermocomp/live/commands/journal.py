@@ -31,10 +31,12 @@ def journal(
     Parameters
     ----------
     what : {'show', 'export'}
-        Action. show: numbers of records and the last events. export: a recording with the temperatures, the
-        measurements, the correction confirmed by the controller, and the uncompensated deviation, for fit.
+        Action. show: print the number of records and the latest events. export: write a recording for thermocomp fit,
+        with the temperatures, the measurements, the correction confirmed by the controller, and the uncompensated
+        deviation.
     path : Path
-        Path of the journal as in the configuration of the service, to read all its files; or one of these files.
+        Path of the journal as in the configuration of the service, to read all files of the journal; or one of these
+        files.
     output : Path
         Output recording (.csv or .parquet).
     every : float

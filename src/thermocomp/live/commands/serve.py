@@ -39,17 +39,17 @@ def serve(
     output: Path = Path("thermocomp-live"),
     check: bool = False,
 ) -> int:
-    """Run the compensator live: sensors in, corrections out, with a page to watch.
+    """Run the compensator live: sensors in, corrections out, with a web page to monitor it.
 
     Parameters
     ----------
     config : Path
-        TOML configuration file: models, sources, sinks, limits, page.
+        TOML configuration file: models, sources of readings, sinks for corrections, limits, web page.
     demo : bool
-        Run a demo without a configuration: the virtual machine at 60 times real time, with a model that is fitted to a
-        recording of it first (a minute or more).
+        Run a demo without a configuration: the virtual machine at 60 times real time, with a model that is first fitted
+        to a recording of it (this takes a minute or more).
     port : int
-        Port of the page, overrides the configured one; 0: any free port.
+        Port of the web page; overrides the configured one. 0: any free port.
     output : Path
         Output folder of the demo: its model, state and corrections.
     check : bool

@@ -28,7 +28,7 @@ MANY = 1000
 
 _GROUPS = {
     "Drift: models and inputs": Drifting,
-    "Initial thermal state: exactly one of cold, carried, measured": Starting,
+    "Initial thermal state: exactly one of --cold, --carried, --measured": Starting,
     "Revision": Way,
     "Controller: settings that are not in the program": Controller,
     "Machining time": Timing,
