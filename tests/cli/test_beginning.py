@@ -142,7 +142,7 @@ def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         "Start of whole: cold (zeroed at rest at its start); assumed, since the displacements begin near zero" in text
     )
-    assert "behind the gate and with limits (at most 500 um, 0.1 um/s, dead band 0 um)" in text
+    assert "and the limits (at most 500 um, 0.1 um/s, dead band 0 um)" in text
 
 
 @pytest.mark.parametrize(

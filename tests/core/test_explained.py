@@ -62,9 +62,12 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     lines = str(explain(replace(model, band=band, validity=covered))).splitlines()
     assert len(lines) == 14
     text = "\n".join(lines)
-    assert "z_um: averaged predicts it [um] from 3 temperatures and spindle_rpm: these and their past." in lines
-    assert "temperatures from their mean over the first 5 min after a start while the spindle is stopped" in text
-    assert "Honest error: 1.25 um RMS, largest 2.00, on unseen cycles; without compensation 5.00 RMS." in lines
+    assert "z_um [um]: predicted by averaged from 3 temperatures and spindle_rpm; present and past values." in lines
+    assert (
+        "temperatures are relative to their mean over the first 5 min after a start while the spindle is stopped"
+        in text
+    )
+    assert "Honest error (on unseen cycles): 1.25 um RMS, largest 2.00; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
     assert f"Band: {band.tell('um')}." in lines
     assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds of 0 to 3000 1/min" in text
@@ -110,11 +113,11 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
 def test_other_families_say_no_contributions() -> None:
     told = explain(replace(lags(room=True), support=Support("fade", 0.1)))
     assert [s.bound for s in told.sensors] == [None, None]
-    assert "Adds at most" not in str(told)
+    assert "Largest contribution" not in str(told)
     assert "widened by 10 %, and the output fades to zero." in str(told)
     assert "the first reading after a start" in told.zero
     absolute = lags()
-    assert explain(absolute).zero == "nothing: its inputs are absolute"
+    assert explain(absolute).zero == "none, all inputs are absolute"
 
 
 def test_inputs_without_an_influence_are_not_its_sensors(model: ErrorModel) -> None:

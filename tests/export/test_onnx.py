@@ -358,7 +358,7 @@ def test_the_file_says_what_it_is_and_is_the_same_each_time() -> None:
     said = {p.key: p.value for p in model.metadata_props}
     assert (said["verdict"], said["sha256"], said["date"]) == (facts[0], FACTS.sha256, FACTS.date)
     assert "0.2 um/s" in said["limits"]
-    assert said["sign"].startswith("a correction [um] is what the controller adds")
+    assert said["sign"].startswith("a correction [um] is added to the commanded position")
     assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.DOUBLE}
 
 

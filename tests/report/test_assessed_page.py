@@ -60,7 +60,7 @@ def test_the_verdict_of_each_cycle_is_there(judged: Judged, page: str) -> None:
         assert unit.name in told
         assert f"{in_um(unit.rms)} / {in_um(unit.none_rms)}" in told
     assert "measured = without compensation" in page
-    assert "The band held" in told
+    assert "The band contains" in told
 
 
 def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) -> None:
@@ -69,13 +69,14 @@ def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) 
     assert "failing: 2 of 3 temperatures failed, 1 did not" in told
     stepped, missing = log.faults
     assert f"t1_C stepped {stepped.begin / 3600:.2f} h the end {stepped.beside:.2f}" in told
-    assert f"t3_C missing {missing.begin / 3600:.2f} h the end –" in told
+    assert f"t3_C missing {missing.begin / 3600:.2f} h the end of the recording –" in told
     for c in find_costs(watched_model(), judged.overall()[0], [log]):
         row = [", ".join(c.failed) or "none", f"{c.hours:.1f}", in_um(c.rms), in_um(c.none_rms), in_um(c.honest)]
-        assert " ".join([*row, "runs on" if c.runs_on else "held, then fades"]) in told
-    harm = f"But: z_um: while t1_C, t3_C failed, the correction is held, then fades at the machine: {c.rms:.2f} um RMS"
+        assert " ".join([*row, "continues" if c.runs_on else "held, then fades"]) in told
+    harm = "But: z_um: while t1_C, t3_C had failed, the machine would hold the correction, then fade it: "
+    harm += f"{c.rms:.2f} um RMS"
     assert harm in told
-    assert "The correction stays for 30 min, then goes to zero with a time constant of 1 h" in told
+    assert "Its correction is held for 30 min, then decays to zero with a time constant of 1 h" in told
 
 
 def test_the_timeline_is_coloured_where_a_sensor_is_not_believed(log: FaultLog, recording: Recording) -> None:
@@ -129,7 +130,10 @@ def test_without_a_failure_there_is_a_sentence() -> None:
     assert "fades" not in words(page)
     bare = replace(judged, models=(replace(watched_model(), watch=None),))
     (why,) = faults.section(bare, [day]).parts
-    assert why == "The temperatures were not watched: the model file contains no watch; fit the model again."
+    assert why == (
+        "Temperature sensors were not monitored for faults: the model file contains no watch (fault detection); fit "
+        "the model again."
+    )
 
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:

@@ -125,7 +125,7 @@ def test_a_point_alone_or_the_volume_alone(mill: tuple[str, str], capsys: pytest
     assert run(["volumetric", mill[0], "--grid", "2"]) == 0
     said = capsys.readouterr().out
     assert "At X" not in said
-    assert "volume: RMS over it" in " ".join(said.split())
+    assert "volume: RMS over the work volume" in " ".join(said.split())
     assert "at 8 points over the work volume" in said
 
 
@@ -142,7 +142,7 @@ def test_a_missing_number_holds_the_state(mill: tuple[str, str], capsys: pytest.
     error = found["course"]["error_um"]
     assert error[300] == error[299] != error[301]
     assert run(["volumetric", machine, "--recording", recording]) == 0
-    assert "in 1 rows an input is missing" in capsys.readouterr().out
+    assert "an input is missing in 1 rows" in capsys.readouterr().out
 
 
 def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -134,7 +134,7 @@ class Planned(Result):
     def __str__(self) -> str:
         best = self.next
         why = f" ({best.news})" if best.news else ""
-        found = [f"Next: {best.trial.words}, {best.gain:.2f} um of {self.plan.expected:.2f} um expected{why}."]
+        found = [f"Next: {best.trial.words}; expected gain {best.gain:.2f} um of {self.plan.expected:.2f} um{why}."]
         if self.curve is not None:
             found.append(f"So far: {self.curve.words}.")
         return " ".join([*found, *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])])

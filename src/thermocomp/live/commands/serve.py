@@ -116,7 +116,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
         if not fades or fading:  # a second stop request skips the fade
             task.cancel()
             return
-        console.print("stopping: the corrections go to zero first; stop again to skip this")
+        console.print("stopping: the corrections fade to zero first; stop again to skip this")
         fading.append(asyncio.create_task(service.fade_out()))
         fading[0].add_done_callback(lambda _: task.cancel())
 
@@ -127,7 +127,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
             for one in work:
                 group.create_task(one)
     kept = f"the state is not saved: {service.keeper.not_saved}" if service.keeper.not_saved else "the state is saved"
-    console.print(words(f"stopped: the corrections stay as they are now; {kept}"), soft_wrap=True)
+    console.print(words(f"stopped: the corrections keep their present values; {kept}"), soft_wrap=True)
 
 
 def _demo(folder: Path) -> Path:
@@ -135,7 +135,7 @@ def _demo(folder: Path) -> Path:
     config, model = folder / "serve.toml", folder / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     if not model.exists():
-        console.print("A model of the virtual machine is fitted to a recording of it, a minute or more ...")
+        console.print("Fitting a model of the virtual machine to a recording of it (a minute or more) ...")
         with needs("study"):
             from thermocomp.api.verbs import fit
         from thermocomp.virtual.verbs import simulate
@@ -151,7 +151,7 @@ def _demo(folder: Path) -> Path:
     return config
 
 
-_CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fast as real time
+_CONFIG = """# thermocomp serve --demo: the virtual machine at {speed} times real time
 models = ["model.json"]
 state = "state.json"
 speed = {speed}.0

@@ -106,8 +106,8 @@ class Way:
 
     def words(self) -> str:
         """Return the method as text."""
-        often = f"every {self.every}" if self.every else f"by {self.tolerance}"
-        return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
+        often = f"every {self.every}" if self.every else f"per {self.tolerance} of drift"
+        return f"{self.method}, updated {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,9 +24,9 @@ Zero = Literal["start", "cold", "last"]
 WARMED = 3.0
 
 _COUNTED: dict[Zero, str] = {
-    "start": "from the start of the program",
-    "cold": "from the cold machine",
-    "last": "from the zero of the last job",
+    "start": "the start of the program",
+    "cold": "the cold machine",
+    "last": "the zero of the last job",
 }
 
 
@@ -175,7 +175,7 @@ class Starting:
         """Return the start state as text."""
         if self.carried is not None:
             name = self.carried.name
-            return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
+            return f"{self.pause} after {name}" if self.pause else f"state of {name}"
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:
