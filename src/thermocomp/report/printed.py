@@ -125,7 +125,7 @@ def _titled(title: str, t: Table) -> Iterator[Item]:
 
 
 def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[PrintedLine]:
-    return (PrintedLine(f"Start of {start.told(name)}") for name, start in begins)
+    return (PrintedLine(f"Initial state of {start.told(name)}") for name, start in begins)
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:
