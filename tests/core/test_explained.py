@@ -69,12 +69,12 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     )
     assert "Honest error (on unseen cycles): 1.25 um RMS, largest 2.00; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
-    assert f"Band: {band.tell('um')}." in lines
-    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds of 0 to 3000 1/min" in text
+    assert f"Uncertainty band: {band.tell('um')}." in lines
+    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds from 0 to 3000 1/min" in text
     assert "1.50 um without it" in next(line for line in lines if line.startswith("  t1_C"))
     third = next(line for line in lines if line.startswith("  t3_C"))
     left, _, spare = third.partition("; spare recommended: ")
-    assert left.endswith("9.00 um without it: held, then fades")
+    assert left.endswith("error 9.00 um without it: the correction is held, then fades")
     assert spare == "without it the correction is held, then fades"
     assert "Two sensors lost at once: judged for 2 pairs; the model continues without 1 of them." in lines
 

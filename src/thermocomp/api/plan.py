@@ -204,7 +204,7 @@ def plan(
     >>> import thermocomp as tc
     >>> planned = tc.plan(tc.simulate("demo"), "z_um", top_speed=6000, curve=False)
     >>> planned.next.trial.words, planned.next.news
-    ('6,000 1/min for 6 h, then a stop as long', 'no run faster than 3,200 1/min')
+    ('6,000 1/min for 6 h, then a stop of equal length', 'no run faster than 3,200 1/min')
     >>> planned.write("next.ngc").name
     'next.csv'
     """

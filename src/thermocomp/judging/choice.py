@@ -38,24 +38,24 @@ class Settings:
     Parameters
     ----------
     threshold : float
-        For grouping: correlation above which a sensor joins a group.
+        grouping: correlation above which a sensor joins a group.
     unsigned : bool
-        For grouping: compare the magnitudes of the correlations, regardless of sign.
+        grouping: compare the magnitudes of the correlations, regardless of sign.
     reference : str
-        For grouping: temperature that is subtracted from the others.
+        grouping: temperature that is subtracted from the others.
     max_sensors : int
-        For subsets, ace and pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
+        subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        For subsets: approximate time limit of the search for the best sets [s]; the result names the sets that are not
+        subsets: approximate time limit of the search for the best sets [s]; the result names the sets that are not
         proven best by then.
     criterion : str
-        For subsets: criterion by which the number of sensors is chosen.
+        subsets: criterion by which the number of sensors is chosen.
     models : list of str
-        For pareto: methods fitted to each set of sensors.
+        pareto: methods fitted to each set of sensors.
     level : float
-        For ace: significance level of the Wilcoxon test.
+        ace: significance level of the Wilcoxon test.
     holm : bool
-        For ace: correct the significance level for the number of tests (Holm).
+        ace: correct the significance level for the number of tests (Holm).
     """
 
     threshold: float = 0.9

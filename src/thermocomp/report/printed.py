@@ -72,7 +72,7 @@ def fit(fitted: Fitted) -> Iterator[Item]:
         Column("sensors", lambda m: len(m["sensors"]), ">"),
         Column("R2 of the fit", "r_squared", ".4f"),
         Column("unseen RMS", "unseen_rms_um", ".2f", "um"),
-        Column("uncompensated RMS", "none_rms_um", ".2f", "um"),
+        Column("none RMS", "none_rms_um", ".2f", "um"),
         Column("verdict", lambda m: verdict(m["verdict"])),
     )
     yield Layout(columns, models)

@@ -129,8 +129,7 @@ class Controller:
         Spindle speed at the start of the program, such as "6000 1/min". Default: none, the program must contain S and
         M3.
     origin : list of str
-        Origins of the work coordinates, such as "G54=100 mm, 50 mm, 0 mm"; needed where the drift depends on the
-        position.
+        Origins of the work coordinates, such as "G54=100 mm, 50 mm, 0 mm"; needed if the drift depends on the position.
     tool : list of str
         Tool lengths, such as "1=120 mm".
     diameter : list of str
@@ -138,8 +137,8 @@ class Controller:
     home : str
         Position approached by G28, such as "0 mm, 0 mm, 400 mm".
     rotation : list of str
-        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; "none" states that none
-        is stored. They rotate the corrections of X and Y.
+        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; "none": no rotation is
+        stored. Stored rotations also rotate the corrections of X and Y.
     no_g92 : bool
         Confirm that no G92 or G52 is in force at the start of the program, nor suspended by G92.2: the method offset
         would erase it.
