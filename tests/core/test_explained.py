@@ -74,7 +74,7 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     assert "1.50 um without it" in next(line for line in lines if line.startswith("  t1_C"))
     third = next(line for line in lines if line.startswith("  t3_C"))
     left, _, spare = third.partition("; spare recommended: ")
-    assert left.endswith("error 9.00 um without it: the correction is held, then fades")
+    assert left.endswith("error 9.00 um without it; the correction is held, then fades")
     assert spare == "without it the correction is held, then fades"
     assert "Two sensors lost at once: judged for 2 pairs; the model continues without 1 of them." in lines
 
@@ -101,8 +101,8 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
     assert {s.spare for s in told.sensors if s.quantity == "temperature"} == {"no other sensor predicts it"}
     text = str(told)
     assert "never judged on unseen cycles; the model will not run" in text
-    assert "Band: none." in text
-    assert "Judged over: not known." in text
+    assert "Uncertainty band: none." in text
+    assert "Judged conditions: not known." in text
     assert "a wrong value is not detected" in text
     assert "None" not in text
     assert "nan" not in text

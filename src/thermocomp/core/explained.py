@@ -293,7 +293,7 @@ def _lines(e: Explanation) -> list[str]:
         )
     lines.append(f"Verdict: {e.word}, {e.reason}.")
     lines.append(f"Uncertainty band: {e.band or 'none'}.")
-    lines.append(f"Conditions covered by the judging: {e.covered or 'not known'}.")
+    lines.append(f"Judged conditions: {e.covered or 'not known'}.")
     lines.append(f"Outside the trained range: {e.outside}.")
     watched = [s for s in e.sensors if s.watched]
     if watched:
@@ -325,7 +325,7 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
     if s.quantity != "temperature":
         left = f" ({s.lost:.2f} {unit} if it read zero)" if s.lost is not None else ""
         return f"{s.name}: not monitored; without it the correction is held, then fades{left}"
-    lost = f"{s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
+    lost = f"error {s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
     parts = []
     if s.watched and s.off is not None and s.jump is not None and s.moved is not None and s.pace is not None:
         shift = f" (a drift up to this limit shifts the output by {s.undetected:.2f} {unit})" if s.undetected else ""
@@ -334,7 +334,7 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
             f"jump by more than {s.jump:.1f} degC in {_span(s.pace)}; drift by {s.off:.1f} degC{shift}; stuck while "
             f"its prediction changes by {s.moved:.1f} degC{still}"
         )
-    parts.append(lost if s.runs_on else f"error {lost}: the correction is held, then fades")
+    parts.append(lost if s.runs_on else f"{lost}; the correction is held, then fades")
     return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
 
 
