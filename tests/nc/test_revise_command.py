@@ -58,7 +58,7 @@ def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
         ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound", "UNPROVED:"]
     )
     assert header[5].endswith("start 2 days after out.ngc.job.json)")
-    assert header[6].endswith("from the zero of the last job)")
+    assert header[6].endswith("relative to the zero of the last job)")
     assert header[7].endswith("steps 1 um)")
     assert all(f"{axis} " in header[8] for axis in "XYZ")
     assert header[8].endswith(" um)")
