@@ -54,7 +54,7 @@ def test_the_same_inputs_give_the_same_files(to: str, tmp_path: Path) -> None:
 def test_a_loss_beyond_the_limit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert exported(tmp_path, small_machine(), "klipper", targets="z_um x_um", method="dynamic") == 1
     said = capsys.readouterr().out
-    assert "refused z_um is left out: loses too much: RMS 3.54 um on unseen cycles" in said
+    assert "refused z_um is left out: loses too much accuracy: RMS 3.54 um on unseen cycles" in said
     assert "x_um is left out: its axis is X, but klipper corrects Z only" in said
     assert not (tmp_path / "out").exists()
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE, "--json"]

@@ -61,7 +61,7 @@ def test_the_boxes_tell_states_and_scale(found: Volumetric) -> None:
         assert moment.name in said
         size = moment.straight.before
         assert f"RMS {size.rms:.1f} um, largest {size.largest:.1f} um" in said
-    assert said.count("after the straight lines") == 3
+    assert said.count("corrected by straight lines") == 3
     (scale,) = (t for t in said if "magnified" in t)
     told = re.fullmatch(r"([\d.]+) um of error, magnified ([\d,]+) times", scale)
     assert told is not None
@@ -109,7 +109,7 @@ def test_machines_of_fewer_axes_and_of_no_errors(mill: tuple[Machine, Recording]
         assert text.count("<svg") == drawn
     nothing = study(replace(machine, components={}))
     assert page.render(nothing).count("<svg") == 2
-    assert volumetric_tables.headline(nothing).startswith("Largest error in the work volume 0.0 um")
+    assert volumetric_tables.headline(nothing).startswith("Largest error in the work volume in the reference state: 0.0 um")
     # what an axis that is not there would have to correct, stays
     sizes = study(two).worst.sizes
     assert sizes["everything"].largest == pytest.approx(3.0, abs=1e-3)

@@ -87,7 +87,7 @@ def contributions(study: Volumetric, *, point: bool) -> Layout:
     )
     told = [c for c in found[:TOLD] if max(c["length_um"], c["volume_rms_um"]) > 0]
     return Layout(
-        columns, told, caption=f"contributions of the components (um), {moment.name}; volume: RMS over the work volume"
+        columns, told, caption=f"contributions of the components (um), {moment.name}; volume: RMS in the work volume"
     )
 
 
@@ -113,12 +113,11 @@ def lines(study: Volumetric, *, page: bool = False) -> Layout:
         ]
     else:
         columns += [
-            Column("reference", "reference_position_mm", "g", "mm", whole=True),
-            Column("residual", "left_along_max_um", "um", "um", whole=True),
+            Column("at", "reference_position_mm", "g", "mm", whole=True),
+            Column("left", "left_along_max_um", "um", "um", whole=True),
         ]
-    return Layout(
-        columns, rows, caption="best straight lines: correction = offset + slope x (position - reference position)"
-    )
+    caption = "best straight lines: correction = offset + slope x (position - reference position)"
+    return Layout(columns, rows, caption=caption + ("" if page else "; at: reference position; left: largest residual"))
 
 
 def volume(study: Volumetric) -> Layout:
