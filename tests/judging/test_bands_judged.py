@@ -161,7 +161,7 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
     print_items(printed.fit(fitted), console)
     shown = capsys.readouterr().out
     assert model.band.tell("um") in shown
-    assert f"held {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
+    assert f"contains {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
     assert "(90 % band by assumption, 3 cycles)" in shown
     tests = [small_machine((1500.0, 2000.0), seed=3)]
     judged = assessing.assess([model], tests)

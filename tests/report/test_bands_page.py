@@ -75,7 +75,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     assert best is not None
     assert best.model == "averaged"
     assert f"<td>{best.half_width:.2f}</td>" in page
-    assert f"held {100 * best.coverage:.0f} % of the judged rows" in page
+    assert f"contains {100 * best.coverage:.0f} % of the judged rows" in page
     assert "90 % band by assumption, 4 cycles: half-width at least" in page
     assert "contributions to the prediction" in page
     model = train("averaged", samples, 0, np.ones(len(samples), np.bool_)).model
@@ -99,7 +99,7 @@ def test_six_inputs_are_drawn_and_the_others_as_one() -> None:
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in shown.figure.axes[0].lines[1:]}
     first, *six, other = lines.values()
     assert next(iter(lines)) == "prediction: sum of all"
-    assert next(reversed(lines)) == "the other 1"
+    assert next(reversed(lines)) == "sum of 1 more"
     assert len(six) == 6
     assert first == pytest.approx(sum(six) + other)  # few rows: none is thinned out
     assert first == pytest.approx(replay(model, samples, np.ones(len(samples), np.bool_))[0], abs=1e-9)

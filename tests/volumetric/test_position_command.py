@@ -158,7 +158,7 @@ def test_all_components_in_one_file(machine: list[Path], tmp_path: Path, capsys:
     assert "3 components, 72 profiles of each in 3 recording(s)" in said
     assert "note not taken: EYY_z600_0_um to EYY_z600_550_um" in said
     assert "Judged on: leave one file out (3 files); settings are selected again in each fold" in said
-    assert "cold profile alone EXY: thermal part: it is noise" in said
+    assert "cold profile only EXY: the thermal part is omitted: it is noise" in said
     models = {m.target: m for m in positionfile.read(output)}
     assert {code: m.powers for code, m in models.items()} == {"EXY": (), "EYY": (1,), "EAY": (0,)}
     assert all(part.accepted for m in models.values() for part in m.models)

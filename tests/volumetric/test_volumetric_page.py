@@ -109,7 +109,9 @@ def test_machines_of_fewer_axes_and_of_no_errors(mill: tuple[Machine, Recording]
         assert text.count("<svg") == drawn
     nothing = study(replace(machine, components={}))
     assert page.render(nothing).count("<svg") == 2
-    assert volumetric_tables.headline(nothing).startswith("Largest error in the work volume in the reference state: 0.0 um")
+    assert volumetric_tables.headline(nothing).startswith(
+        "Largest error in the work volume in the reference state: 0.0 um"
+    )
     # what an axis that is not there would have to correct, stays
     sizes = study(two).worst.sizes
     assert sizes["everything"].largest == pytest.approx(3.0, abs=1e-3)

@@ -54,7 +54,7 @@ def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
             ax.plot(*thin_points(hours, parts[name]), color=colour, label=name)
         if rest := ranked[MOST:]:
             others = sum((parts[name] for name in rest), np.zeros(len(samples)))
-            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"{len(rest)} others, summed")
+            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"sum of {len(rest)} more")
         ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
         ax.set_xlabel("time [h]")
         ax.margins(x=0)

@@ -202,7 +202,7 @@ def _fault_table(log: FaultLog, recording: Recording) -> Layout:
         Column("sensor", lambda f: f.sensor),
         Column("fault", lambda f: f.word),
         Column("detected", lambda f: _when(f.begin, recording), ">"),
-        Column("until", lambda f: _when(f.end, recording) if f.returned else "the end of the recording", ">"),
+        Column("until", lambda f: _when(f.end, recording) if f.returned else "the end", ">"),
         Column("reading minus substitute, mean", lambda f: f.beside, "um", "degC"),
     )
     more = len(log.faults) - ROWS
