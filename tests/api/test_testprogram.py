@@ -97,8 +97,8 @@ def test_linuxcnc_runs_it(trial: Trial, every: float, tmp_path: Path) -> None:
 
 def test_the_sheet_filled_in_is_a_recording(tmp_path: Path) -> None:
     rows = list(csv.reader(io.StringIO(write_sheet(GRID[1], CHANNELS, 600.0))))
-    assert rows[0] == ["time_min", "spindle_rpm", "t_bearing_C", "z_um", "what to do"]
-    assert rows[3][-1] == "write down all, then run at 864 1/min"
+    assert rows[0] == ["time_min", "spindle_rpm", "t_bearing_C", "z_um", "action"]
+    assert rows[3][-1] == "record all values, then run at 864 1/min"
     filled = [rows[0], *([*row[:2], f"{20 + k / 10}", f"{k}", row[-1]] for k, row in enumerate(rows[1:]))]
     path = tmp_path / "filled.csv"
     path.write_text("\n".join(",".join(f'"{c}"' if "," in c else c for c in row) for row in filled), encoding="utf-8")

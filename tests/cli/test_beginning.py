@@ -140,9 +140,10 @@ def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["assess", str(folder / "model.json"), str(folder / "whole.csv")]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert (
-        "Start of whole: cold (zeroed at rest at its start); assumed, since the displacements begin near zero" in text
+        "Initial state of whole: cold (zeroed at its start, at rest); assumed, since the displacements begin near zero"
+        in text
     )
-    assert "behind the gate and with limits (at most 500 um, 0.1 um/s, dead band 0 um)" in text
+    assert "and the limits (at most 500 um, 0.1 um/s, dead band 0 um)" in text
 
 
 @pytest.mark.parametrize(

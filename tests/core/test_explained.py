@@ -62,16 +62,19 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     lines = str(explain(replace(model, band=band, validity=covered))).splitlines()
     assert len(lines) == 14
     text = "\n".join(lines)
-    assert "z_um: averaged predicts it [um] from 3 temperatures and spindle_rpm: these and their past." in lines
-    assert "temperatures from their mean over the first 5 min after a start while the spindle is stopped" in text
-    assert "Honest error: 1.25 um RMS, largest 2.00, on unseen cycles; without compensation 5.00 RMS." in lines
+    assert "z_um [um]: predicted by averaged from 3 temperatures and spindle_rpm; present and past values." in lines
+    assert (
+        "temperatures are relative to their mean over the first 5 min after a start while the spindle is stopped"
+        in text
+    )
+    assert "Honest error (on unseen cycles): 1.25 um RMS, largest 2.00; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
-    assert f"Band: {band.tell('um')}." in lines
-    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds of 0 to 3000 1/min" in text
+    assert f"Uncertainty band: {band.tell('um')}." in lines
+    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds from 0 to 3000 1/min" in text
     assert "1.50 um without it" in next(line for line in lines if line.startswith("  t1_C"))
     third = next(line for line in lines if line.startswith("  t3_C"))
     left, _, spare = third.partition("; spare recommended: ")
-    assert left.endswith("9.00 um without it: held, then fades")
+    assert left.endswith("error 9.00 um without it; the correction is held, then fades")
     assert spare == "without it the correction is held, then fades"
     assert "Two sensors lost at once: judged for 2 pairs; the model continues without 1 of them." in lines
 
@@ -98,8 +101,8 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
     assert {s.spare for s in told.sensors if s.quantity == "temperature"} == {"no other sensor predicts it"}
     text = str(told)
     assert "never judged on unseen cycles; the model will not run" in text
-    assert "Band: none." in text
-    assert "Judged over: not known." in text
+    assert "Uncertainty band: none." in text
+    assert "Judged conditions: not known." in text
     assert "a wrong value is not detected" in text
     assert "None" not in text
     assert "nan" not in text
@@ -110,11 +113,11 @@ def test_what_is_not_known_is_not_made_up(model: ErrorModel) -> None:
 def test_other_families_say_no_contributions() -> None:
     told = explain(replace(lags(room=True), support=Support("fade", 0.1)))
     assert [s.bound for s in told.sensors] == [None, None]
-    assert "Adds at most" not in str(told)
+    assert "Largest contribution" not in str(told)
     assert "widened by 10 %, and the output fades to zero." in str(told)
     assert "the first reading after a start" in told.zero
     absolute = lags()
-    assert explain(absolute).zero == "nothing: its inputs are absolute"
+    assert explain(absolute).zero == "none, all inputs are absolute"
 
 
 def test_inputs_without_an_influence_are_not_its_sensors(model: ErrorModel) -> None:

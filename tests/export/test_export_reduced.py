@@ -34,7 +34,7 @@ def test_the_same_inputs_give_the_same_files(to: str, tmp_path: Path) -> None:
     assert {p.name: p.read_bytes() for p in (tmp_path / "again").iterdir()} == first
     assert run([*line, "-o", str(tmp_path / "again")]) == 2
     page = first["tc_thermal.md"].decode()
-    assert page.startswith("z_um: accepted on unseen cycles; reduced to what the controller holds")
+    assert page.startswith("z_um: accepted on unseen cycles; reduced to a form that the controller supports")
     for words in (
         "SHA-256 ",
         "thermocomp 0.",
@@ -45,7 +45,7 @@ def test_the_same_inputs_give_the_same_files(to: str, tmp_path: Path) -> None:
         "tc_thermal_reduced.svg",
     ):
         assert words in page
-    for title in ("What it leaves", "What is lost", "Install", "Check", "Switch off"):
+    for title in ("Residual error", "What is lost", "Install", "Check", "Switch off"):
         assert f"## {title}\n" in page
     figure = first["tc_thermal_reduced.svg"].decode()
     assert all(f"{words}: RMS " in figure for words in ("without compensation", "full model", "reduced model"))
@@ -54,7 +54,7 @@ def test_the_same_inputs_give_the_same_files(to: str, tmp_path: Path) -> None:
 def test_a_loss_beyond_the_limit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert exported(tmp_path, small_machine(), "klipper", targets="z_um x_um", method="dynamic") == 1
     said = capsys.readouterr().out
-    assert "refused z_um is left out: loses too much: RMS 3.54 um on unseen cycles" in said
+    assert "refused z_um is left out: loses too much accuracy: RMS 3.54 um on unseen cycles" in said
     assert "x_um is left out: its axis is X, but klipper corrects Z only" in said
     assert not (tmp_path / "out").exists()
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE, "--json"]
@@ -81,7 +81,7 @@ def test_what_is_unproven_wants_somebody_who_takes_it(tmp_path: Path, capsys: py
     line = ["export", str(tmp_path / "model.json"), str(tmp_path / "drift.csv"), "--to", "klipper", *DATE]
     assert run([*line, "-o", str(tmp_path / "out"), "--accept-unproven", "M. Weber, trial"]) == 0
     lines = (tmp_path / "out" / "tc_thermal.cfg").read_text().splitlines()
-    assert lines[0] == "# z_um: UNPROVEN, approved nevertheless; reduced to what the controller holds"
+    assert lines[0] == "# z_um: UNPROVEN, approved nevertheless; reduced to a form that the controller supports"
     assert lines[1] == "# z_um: unproven, approved by M. Weber, trial"
 
 

@@ -69,12 +69,12 @@ def test_what_is_not_confirmed_is_marked() -> None:
     texts = write_heidenhain([as_it_is(growing("z_um", 2.0), "Z")], Limits(), "tc", FACTS)
     lines, page = texts["tc.txt"].decode().splitlines(), texts["tc.md"].decode()
     first = lines.index("")
-    assert lines[0] == "; z_um: accepted on unseen cycles; the model as it is"
+    assert lines[0] == "; z_um: accepted on unseen cycles; the full model, not reduced"
     assert all(f"; {line}" in lines[:first] for line in UNCONFIRMED)
     for k, line in enumerate(lines):
         if line.startswith(("Z formula", "Z word")):
             assert lines[k - 1].startswith("; UNCONFIRMED")
-    assert page.index("UNCONFIRMED") < page.index("## What it leaves")
+    assert page.index("UNCONFIRMED") < page.index("## Residual error")
     assert page.partition("## Install")[2].partition("## Check")[0].count("**UNCONFIRMED**") == 2
 
 

@@ -47,7 +47,9 @@ def test_a_machine_that_grows_is_lowered(tmp_path: Path) -> None:
     coefficient = float(re.findall(r"^temp_coeff: (.*)$", text, re.M)[0])
     assert coefficient == pytest.approx(0.012, rel=0.01)
     assert klipper(text)(np.array([30.0]), 20.0) == pytest.approx(-120.0, rel=0.01)
-    assert text.startswith("# z_um: accepted on unseen cycles; reduced to what the controller holds\n# z_um: RMS 0.")
+    assert text.startswith(
+        "# z_um: accepted on unseen cycles; reduced to a form that the controller supports\n# z_um: RMS 0."
+    )
     for words in (
         "max_z_adjustment: 0.5\n",
         "sensor_type: FILL_IN",

@@ -343,7 +343,7 @@ def test_the_file_says_what_it_is_and_is_the_same_each_time() -> None:
             FACTS.date,
         )
         assert "0.2 um/s" in said["limits"]
-        assert said["sign"].startswith("a correction [um] is what the controller adds")
+        assert said["sign"].startswith("a correction [um] is added to the commanded position")
         assert said["units"].startswith("temperatures in degC")
         assert said["deviation"] == f"{file[len(name) + 1 : -5]} [um]"
         assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.DOUBLE}

@@ -118,12 +118,12 @@ def page_numbers(page: str, target: str = "z_um") -> dict[str, list[float]]:
         what: [float(v) for v in re.findall(r"[-\d.]+|nan", line)]
         for what, line in re.findall(rf"^\| {target}: (RMS|largest) \|(.*)\|$", page, re.M)
     }
-    written = re.search(rf"^{target}: over the recordings .* RMS ([\d.]+) um, largest ([\d.]+) um", page, re.M)
+    written = re.search(rf"^{target}: on the recordings .* RMS ([\d.]+) um, largest ([\d.]+) um", page, re.M)
     return found | {"written": [float(v) for v in written.groups()] if written else []}
 
 
 def left_out_cycles(page: str, target: str = "z_um") -> list[tuple[dict[str, float], list[float]]]:
     """Return the rows of its table of cycles: um per kelvin by sensor, and what none, full and reduced leave."""
-    table = page.partition(f"{target}: what was fitted without")[2].partition("\n\n")[2].partition("\n\n")[0]
+    table = page.partition(f"{target}: coefficients fitted without")[2].partition("\n\n")[2].partition("\n\n")[0]
     rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
     return [({n: float(f) for n, f in re.findall(r"(\w+) ([-\d.e]+)", r[1])}, [float(v) for v in r[2:]]) for r in rows]

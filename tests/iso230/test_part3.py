@@ -250,7 +250,7 @@ def test_noise_alone_stands_still(memory: float) -> None:
         if seed == 0:
             table = thermal_tables(test)[-1]
             assert table.rows[0][-1] == "still"
-            assert "its averages do not change by more than their noise" in table.caption
+            assert "the averaged curve does not change by more than its noise" in table.caption
             assert any(n.startswith("y1_um, y2_um, z_um, A: the averages do not change") for n in test.notes)
     assert (still >= 95).all(), still
 

@@ -129,7 +129,7 @@ def test_an_overshoot_has_no_time_to_90_percent() -> None:
         assert s.two is not None
         (table,) = time_constant_tables([s])
         assert table.rows[0][2:4] == ("peaks", "peaks")
-        assert "peaks: it overshoots its last value" in str(table.caption)
+        assert "peaks: the curve overshoots" in str(table.caption)
         assert settling_content(s)["told"] == "overshoots"
     # a twentieth is within the band of t90
     slight = settle(TIME, 11 * rise(600) - rise(4000) + jitter, "z", "um", PHASE)

@@ -75,11 +75,11 @@ def test_the_last_phase_is_judged() -> None:
     assert not judge_running(early, ["z_um"]).may_stop
     found = judge_running(late, ["z_um"])
     assert found.may_stop
-    assert "warm-up 1, 2.5 h: the steady state is known; stop the spindle" in found.words
+    assert "warm-up 1, 2.5 h: the steady state is known accurately enough; stop the spindle" in found.words
     cold = judge_running(cooling, ["z_um"])
     assert cold.phase.kind == "cool-down"
     assert not cold.may_stop
-    assert "continue; not known yet: z_um" in cold.words
+    assert "continue; the steady state is not known accurately enough of z_um" in cold.words
     assert "the test may end" in judge_running(running(150, 150), ["z_um"]).words
 
 

@@ -161,7 +161,7 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
     print_items(printed.fit(fitted), console)
     shown = capsys.readouterr().out
     assert model.band.tell("um") in shown
-    assert f"held {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
+    assert f"contains {100 * fitted.comparison.overall()[0].coverage:.0f} % of the judged rows" in shown
     assert "(90 % band by assumption, 3 cycles)" in shown
     tests = [small_machine((1500.0, 2000.0), seed=3)]
     judged = assessing.assess([model], tests)
@@ -175,6 +175,6 @@ def test_the_words_of_a_band_give_the_half_widths_where_structures_agree() -> No
     band = Band(0.9, "assumption", 4, 1.5, 2.0, 3.0, (1,))
     assert band.tell("um") == (
         "90 % band by assumption, 4 cycles: half-width at least 4.50 um at rest and 3.00 um running, "
-        "more where its structures differ"
+        "more where the averaged models disagree"
     )
     assert "4.50 um at rest and 4.50 um running" in replace(band, speeds=()).tell("um")

@@ -138,5 +138,5 @@ def test_the_model_file_carries_it_and_assess_tells_both(samples: Samples, recor
     assert shown.columns == ("", "when fitted", "these recordings")
     cells = {str(row[0]): row[1:] for row in shown.rows}
     assert cells["spindle speeds [1/min]"] == ("0, 1000, 1800, 2500, 3000", "0, 900, 2000")
-    assert cells["units judged"] == ("4, 4 of them distinct", "2, 2 of them distinct")
+    assert cells["cycles or files judged"] == ("4, 4 of them distinct", "2, 2 of them distinct")
     assert "copies count once" in shown.caption

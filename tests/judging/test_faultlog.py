@@ -232,9 +232,9 @@ def test_what_is_held_is_told_and_has_no_band(model: ErrorModel) -> None:
     recording = failing(t3_C=(4.0, None))
     judged = assessing.assess([model], [recording], starts=Start())
     (line,) = describe_held(judged, find_faults(judged, [recording]))
-    assert line.startswith("z_um: while t3_C failed, the correction is held, then fades at the machine: ")
+    assert line.startswith("z_um: while t3_C had failed, the machine would hold the correction, then fade it: ")
     (told,) = describe_bands(judged.models, judged.overall())
-    assert "of the judged rows that have one (" in told
+    assert "of the judged rows with a band (" in told
     (whole,) = judged.overall()
     assert whole.undisturbed < whole.metric("rms")
 

@@ -174,7 +174,7 @@ def test_a_model_that_fails_on_the_way_to_few_sensors(samples: Samples, monkeypa
     settings = Settings(models=["ols", "dynamic"], max_sensors=2)
     (choice,) = selecting.select("pareto", samples, judging, settings)
     assert choice.reason.startswith("dynamic with")
-    assert "Not judged with some numbers of sensors: ols: the memory is full (MemoryError)" in choice.notes
+    assert "Some numbers of sensors could not be judged: ols: the memory is full (MemoryError)" in choice.notes
     with pytest.raises(FitError, match="could be judged in every block: ols: the memory is full"):
         selecting.select("pareto", samples, judging, Settings(models=["ols"], max_sensors=2))
 

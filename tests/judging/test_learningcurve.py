@@ -74,7 +74,7 @@ def test_a_curve_that_is_flat_is_enough_and_one_that_falls_is_not() -> None:
     falling = curve_of({1: 12.0, 2: 9.0, 3: 6.0, 4: 3.0})
     assert not falling.enough
     assert falling.last_gain == pytest.approx(3.0)
-    assert "the error still decreases" in falling.words
+    assert "the error is still decreasing" in falling.words
     assert "does not help on unseen cycles" in curve_of({1: 8.0, 2: 7.9}, none=5.0).words
     assert curve_of({1: 0.0, 2: 0.0}, none=0.0).enough
     assert curve_of({1: 3.0, 2: 2.9}, none=0.5).worth == pytest.approx(0.025)

@@ -61,8 +61,8 @@ def test_the_grid_is_all_of_one_length_and_as_stated() -> None:
     assert {t.duration for t in grid} == {6.25 * 3600}
     assert {t.speed for t in grid} == {0.0, 600.0, 1200.0, 1800.0, 2400.0, 3000.0}
     assert {t.words for t in grid if t.speed == 600.0} == {
-        "600 1/min for 0.5 h, stop as long, repeated",
-        "600 1/min for 3 h, then a stop as long",
+        "600 1/min for 0.5 h and a stop of equal length, repeated",
+        "600 1/min for 3 h, then a stop of equal length",
         "600 1/min for 6 h",
     }
 

@@ -92,7 +92,7 @@ def test_they_lower_the_error_of_another_day(day: Recording, fitted: tc.ErrorMod
     assert two.held_metric("rms") > two.metric("rms")
     *larger, line = describe_probings(probed.judged.overall())
     grows = two.metric("max_abs") > one.metric("max_abs")
-    assert ["largest error increases" in told for told in larger] == [True] * grows
+    assert ["increase the largest error" in told for told in larger] == [True] * grows
     assert line.startswith("z_um, a probing every 2 h (")
     assert f"{two.metric('rms'):.2f} and {two.metric('mae'):.2f}; {one.metric('rms'):.2f} and " in line
     cycles = [a for a in probed.judged.assessments if not a.overall]

@@ -65,12 +65,13 @@ def test_show(live: Journal, capsys: pytest.CaptureFixture[str]) -> None:
     assert [line.removeprefix(stamp) for line in lines[3:]] == [
         "state  z_um holding: no reading for [bold]3 s",
         "reference  z_um is re-zeroed: homing",
-        "measurement  z_um probing +2.00 um under a correction of -10.00 um, not included in the value; "
+        "measurement  z_um probing +2.00 um, measured with a correction of -10.00 um, not included in the value; "
         "deviation +12.00 um",
-        "measurement  z_um work_offset +12.00 um under a correction of -10.00 um, included in the value; "
-        "deviation +12.00 um; the correction counts twice while it remains in force",
-        "measurement  z_um tool_length +12.00 um under no correction, included in the value; deviation +12.00 um",
-        "measurement  z_um probing +12.00 um under an unknown correction, not included in the value; "
+        "measurement  z_um work_offset +12.00 um, measured with a correction of -10.00 um, included in the value; "
+        "deviation +12.00 um; the correction is applied twice while it remains in force",
+        "measurement  z_um tool_length +12.00 um, measured with no correction, included in the value; "
+        "deviation +12.00 um",
+        "measurement  z_um probing +12.00 um, measured with an unknown correction, not included in the value; "
         "the deviation is not known",
         "alarm  sensor: t1_C stuck",
         "update  z_um measured +12.00 um, +10.00 to +11.50 um",

@@ -101,7 +101,7 @@ def test_log_text() -> None:
     assert "LEFT OUT BECAUSE CONSTANT: T5\n" in text
     assert text.count("*") == len(found.groups_) + 1
     assert text.count(" YES ") == len(found.participating_) == len(found.selected_)
-    assert f"LOOKED AT: {2 ** len(found.groups_) - 1} SUBSETS" in text
+    assert f"EXAMINED: {2 ** len(found.groups_) - 1} SUBSETS" in text
     assert f"CONDITION NUMBER: {found.spectrum_.condition_number:.3g}" in text
     for name, value in zip(found.terms_, found.coef_, strict=True):
         assert f"{name}  {value:14.6g}".replace(" ", "") in text.replace(" ", "")

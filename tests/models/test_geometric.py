@@ -85,7 +85,8 @@ def test_a_fit_says_that_it_leaves_more_than_the_noise() -> None:
     assert line.leaves_more
     assert line.noise == fifth.noise == pytest.approx(0.1, rel=0.4)
     assert line.words == (
-        f"leaves {line.rms:.3g} where repeated values differ by {line.noise:.3g}: it misses part of the shape"
+        f"leaves a residual of {line.rms:.3g}, but repeated values differ only by {line.noise:.3g}: it misses part of "
+        "the shape"
     )
     assert fifth.words == ""
     assert 0.01 < fifth.misfit <= 1.0

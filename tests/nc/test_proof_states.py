@@ -220,7 +220,7 @@ def test_the_sentence(tmp_path: Path) -> None:
     setup = Setup(inch=False, tools={1: 120.0}, offsets={1: (0.0, 0.0, -400.0)}, rotations={1: 5.0}, startup="G98")
     proof = judge(tmp_path, TURN, TURN, [shift()] * 9, setup)
     assert proof.sentence.startswith(
-        "in 8 controller states; the same in all: what the program specifies, mm, G54 at X0 Y0 Z-400, tool 1 = 120 mm, "
+        "in 8 controller states; equal in all: what the program specifies, mm, G54 at X0 Y0 Z-400, tool 1 = 120 mm, "
         "G54 turned by"
     )
     assert proof.states == 8

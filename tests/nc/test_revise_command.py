@@ -22,7 +22,9 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     text = " ".join(capsys.readouterr().out.split())
     assert "part.ngc: 23 lines" in text
     assert "spindle 4000 to 6000 1/min; 2 tool changes" in text
-    assert "Start: cold, drift counts from the start of the program; method coordinates, renewed by 1 um" in text
+    assert (
+        "Start: cold, drift relative to the start of the program; method coordinates, updated per 1 um of drift" in text
+    )
     assert "but the models use the spindle speed alone" in text
     assert "but no interpreter has verified it (--unproved); assumed: no stored rotation (--rotation), no G92" in text
     assert "but no picture was drawn: matplotlib is not installed" in text
@@ -40,7 +42,7 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     assert "2026-01-31, for linuxcnc" in header[1]
     assert any("model model.json " in line and line.endswith(" for Z)") for line in header)
     assert any(line.endswith(" start cold)") for line in header)
-    assert any(line.endswith(" drift counts from the start of the program)") for line in header)
+    assert any(line.endswith(" drift relative to the start of the program)") for line in header)
     assert any("bound Z" in line and " um" in line for line in header)
 
 
@@ -56,7 +58,7 @@ def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
         ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound", "UNPROVED:"]
     )
     assert header[5].endswith("start 2 days after out.ngc.job.json)")
-    assert header[6].endswith("from the zero of the last job)")
+    assert header[6].endswith("relative to the zero of the last job)")
     assert header[7].endswith("steps 1 um)")
     assert all(f"{axis} " in header[8] for axis in "XYZ")
     assert header[8].endswith(" um)")
@@ -167,7 +169,7 @@ def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.
     capsys.readouterr()
     assert revise("--carried", "out.ngc.job.json", out="next.ngc", start="") == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert "as out.ngc.job.json left it, drift counts from the zero of the last job" in text
+    assert "state of out.ngc.job.json, drift relative to the zero of the last job" in text
     rows = table("next.ngc.csv")
     assert float(rows[0]["drift_z_um"]) == pytest.approx(ended, abs=0.01)
     # the first word already carries the drift that the last job has left
@@ -177,7 +179,7 @@ def test_a_job_begins_where_the_last_one_ended(job_folder: Path, capsys: pytest.
     assert float(table("late.ngc.csv")[0]["drift_z_um"]) == pytest.approx(0.0, abs=0.1)
     header = Path("late.ngc").read_text(encoding="ascii").splitlines()
     assert f"({MARK} start 8 h after out.ngc.job.json)" in header
-    assert f"({MARK} drift counts from the zero of the last job)" in header
+    assert f"({MARK} drift relative to the zero of the last job)" in header
     assert revise("--carried", "out.ngc.job.json", "--zero", "start", out="again.ngc", start="") == 0
     assert float(table("again.ngc.csv")[0]["drift_z_um"]) == 0.0
 

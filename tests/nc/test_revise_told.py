@@ -112,7 +112,7 @@ def test_what_another_offset_would_cost_is_told(job_folder: Path, capsys: pytest
     sentence = f"100 mm offset change: error up to Z {most:.1f} um"
     assert f"the correction is made for G54 X0 Y0 Z300, T1 120 mm; {sentence}" in told["notes"]
     header = Path("out.ngc").read_text(encoding="ascii").splitlines()
-    assert f"({MARK} made for G54 X0 Y0 Z300, T1 120 mm)" in header
+    assert f"({MARK} valid for G54 X0 Y0 Z300, T1 120 mm)" in header
     assert f"({MARK} {sentence})" in header
     Path("part.ngc").write_text(PLATE.replace(" G54", ""), encoding="ascii")
     assert revise(*options, "--overwrite") == 0

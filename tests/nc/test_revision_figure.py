@@ -28,7 +28,8 @@ def test_panels_and_their_titles() -> None:
     figure = revision.draw(made(), [X, Z], [60.0, 300.0], "part.ngc, cold")
     x, z, speed = figure.axes
     assert x.get_title("left") == (
-        "X: the tool drifts by up to 0.0 um; residual in the cuts at most 0.0 um; the model was never judged: no bound"
+        "X: the tool drifts by up to 0.0 um; residual in the cuts at most 0.0 um; no bound, since the model "
+        "was never judged"
     )
     assert z.get_title("left") == (
         "Z: the tool drifts by up to 20.0 um; residual in the cuts at most 0.8 um; bound 9.8 um"

@@ -34,7 +34,7 @@ def test_the_page_says_all_of_it(study: Study, tmp_path: Path) -> None:
     page = tmp_path / "papers.html"
     papers.write([study, replace(study, name="other")], page, seed=7)
     text = page.read_text(encoding="utf-8")
-    assert text.count("1 of 2 claims hold on the virtual machine; 1 more number beside the paper") == 4
+    assert text.count("1 of 2 claims hold on the virtual machine; 1 more number next to the paper") == 4
     assert "seed 7" in text
     assert 'href="#other"' in text
     for said in ("H-18,<br>E-H8", "It scatters &lt;less&gt;", "the noise &amp; all that", "Fig. 1: what was made up."):

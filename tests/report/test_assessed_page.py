@@ -60,22 +60,23 @@ def test_the_verdict_of_each_cycle_is_there(judged: Judged, page: str) -> None:
         assert unit.name in told
         assert f"{in_um(unit.rms)} / {in_um(unit.none_rms)}" in told
     assert "measured = without compensation" in page
-    assert "The band held" in told
+    assert "The band contains" in told
 
 
 def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) -> None:
     told = words(page)
     assert "small" not in told
-    assert "failing: 2 of 3 temperatures failed, 1 did not" in told
+    assert "failing: 2 of 3 temperature sensors failed, 1 did not" in told
     stepped, missing = log.faults
     assert f"t1_C stepped {stepped.begin / 3600:.2f} h the end {stepped.beside:.2f}" in told
     assert f"t3_C missing {missing.begin / 3600:.2f} h the end –" in told
     for c in find_costs(watched_model(), judged.overall()[0], [log]):
         row = [", ".join(c.failed) or "none", f"{c.hours:.1f}", in_um(c.rms), in_um(c.none_rms), in_um(c.honest)]
-        assert " ".join([*row, "runs on" if c.runs_on else "held, then fades"]) in told
-    harm = f"But: z_um: while t1_C, t3_C failed, the correction is held, then fades at the machine: {c.rms:.2f} um RMS"
+        assert " ".join([*row, "continues" if c.runs_on else "held, then fades"]) in told
+    harm = "But: z_um: while t1_C, t3_C had failed, the machine would hold the correction, then fade it: "
+    harm += f"{c.rms:.2f} um RMS"
     assert harm in told
-    assert "The correction stays for 30 min, then goes to zero with a time constant of 1 h" in told
+    assert "Its correction is held for 30 min, then decays to zero with a time constant of 1 h" in told
 
 
 def test_the_timeline_is_coloured_where_a_sensor_is_not_believed(log: FaultLog, recording: Recording) -> None:
@@ -123,13 +124,17 @@ def test_codes_of_a_dead_sensor_do_not_flatten_the_curves(judged: Judged) -> Non
 def test_without_a_failure_there_is_a_sentence() -> None:
     day = failing()
     judged = assessing.assess([watched_model()], [day], starts=Start())
-    assert faults.section(judged, [day]) == Section("Sensors", ["None of the 3 temperatures failed: t1_C, t2_C, t3_C."])
+    none = "None of the 3 temperature sensors failed: t1_C, t2_C, t3_C."
+    assert faults.section(judged, [day]) == Section("Sensors", [none])
     page = assessed.render(judged, [day])
-    assert "None of the 3 temperatures failed" in page
+    assert "None of the 3 temperature sensors failed" in page
     assert "fades" not in words(page)
     bare = replace(judged, models=(replace(watched_model(), watch=None),))
     (why,) = faults.section(bare, [day]).parts
-    assert why == "The temperatures were not watched: the model file contains no watch; fit the model again."
+    assert why == (
+        "Temperature sensors were not monitored for faults: the model file contains no watch (fault detection); fit "
+        "the model again."
+    )
 
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:
@@ -161,8 +166,8 @@ def test_two_recordings_are_told_apart(recording: Recording) -> None:
     both = [recording, replace(day, table=table)]
     judged = assessing.assess([watched_model()], both, starts=Start())
     page = words(assessed.render(judged, both))
-    assert "failing: 2 of 3 temperatures failed" in page
-    assert "other: 1 of 3 temperatures failed" in page
+    assert "failing: 2 of 3 temperature sensors failed" in page
+    assert "other: 1 of 3 temperature sensors failed" in page
     assert "t2_C missing 5.00 h (2024-05-02 03:00) the end" in page
     clips = re.findall(r'<clipPath id="([^"]+)"', assessed.render(judged, both))
     assert len(clips) == len(set(clips))

@@ -75,7 +75,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     assert best is not None
     assert best.model == "averaged"
     assert f"<td>{best.half_width:.2f}</td>" in page
-    assert f"held {100 * best.coverage:.0f} % of the judged rows" in page
+    assert f"contains {100 * best.coverage:.0f} % of the judged rows" in page
     assert "90 % band by assumption, 4 cycles: half-width at least" in page
     assert "contributions to the prediction" in page
     model = train("averaged", samples, 0, np.ones(len(samples), np.bool_)).model
@@ -83,7 +83,7 @@ def test_the_page_says_it(comparison: Comparison, samples: Samples) -> None:
     for g in gains(model, 60.0):
         row = f'<td class="l">{g.name}</td><td>{in_um(g.instantaneous)}</td><td>{in_um(g.settled)}</td>'
         assert row in page
-    assert "Lags of the temperatures: 10, 30, 90 min." in page
+    assert "Time constants of the temperature lags: 10, 30, 90 min." in page
     bare = replace(comparison, assessments=tuple(a for a in comparison.assessments if a.model == "ols"))
     page = html.render(bare, [small_machine()], samples)
     assert "share of the judged rows" not in page
@@ -98,8 +98,8 @@ def test_six_inputs_are_drawn_and_the_others_as_one() -> None:
     shown = contributions.explain(model, samples).figure
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in shown.figure.axes[0].lines[1:]}
     first, *six, other = lines.values()
-    assert next(iter(lines)) == "predicted: all together"
-    assert next(reversed(lines)) == "the other 1"
+    assert next(iter(lines)) == "prediction: sum of all"
+    assert next(reversed(lines)) == "sum of 1 more"
     assert len(six) == 6
     assert first == pytest.approx(sum(six) + other)  # few rows: none is thinned out
     assert first == pytest.approx(replay(model, samples, np.ones(len(samples), np.bool_))[0], abs=1e-9)

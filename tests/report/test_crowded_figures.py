@@ -140,4 +140,4 @@ def test_what_does_no_harm_was_tried(comparison: Comparison) -> None:
         )
         for a in comparison.assessments
     )
-    assert "nothing that was tried</td>" in html.render(replace(comparison, assessments=calm), [small_machine()])
+    assert "no disturbance tried</td>" in html.render(replace(comparison, assessments=calm), [small_machine()])

@@ -33,14 +33,14 @@ def lines(model: ErrorModel, lost: dict[str, float]) -> str:
 def test_a_spare_is_recommended_where_what_stands_in_is_dear_or_nothing_does(model: ErrorModel) -> None:
     said = lines(model, {"t1_C": 2.1, "t2_C": 1.9, "t3_C": 6.5})
     assert (
-        "A spare sensor is recommended for t1_C, t3_C: without it a correction is held, or its error is over 2 times"
-        in said
+        "A spare sensor is recommended for t1_C, t3_C: without it a correction is held, or the error is more than 2 "
+        "times" in said
     )
-    assert "without t3_C its correction is held" in said
+    assert "without t3_C the correction is held" in said
 
 
 def test_no_spare_is_recommended_where_all_are_replaced_well(model: ErrorModel) -> None:
     said = lines(model, {"t1_C": 2.0, "t2_C": 1.0, "t3_C": 1.2, "spindle_rpm": 9.0})
-    assert "without spindle_rpm its correction is held" in said
-    assert "lost temperature, replaced by its prediction, leaves at most 2.00" in said
+    assert "without spindle_rpm the correction is held" in said
+    assert "at most 2.00 um with one temperature sensor lost and replaced by its prediction" in said
     assert "is recommended" not in said

@@ -47,7 +47,7 @@ def test_the_next_test_stands_in_its_gap(found: Plan) -> None:
     ends = near.get_window_extent().transformed(runs.transData.inverted())
     assert (ends.x0, ends.x1) == pytest.approx((6000 - SAME * 6000, 6000 + SAME * 6000))
     assert not [v for v, _, _ in found.covered.runs if ends.x0 <= v <= ends.x1]  # it is a gap
-    assert [t.get_text() for t in room.texts] == ["no temperature of\nthe room was recorded"]
+    assert [t.get_text() for t in room.texts] == ["no room temperature\nwas recorded"]
     assert len(tests.patches) == len(found.candidates)
     shown = figure.subfigs[0].get_suptitle()
     assert shown == f"next: {best.words}: no run faster than 3,000 1/min"

@@ -45,7 +45,7 @@ def test_verdict_is_one_true_sentence(comparison: Comparison) -> None:
 
 
 def test_stopped_work_is_told_first(comparison: Comparison) -> None:
-    assert cautions(replace(comparison, left=2))[0].startswith("the work was stopped: 2 pairs")
+    assert cautions(replace(comparison, left=2))[0].startswith("the comparison was stopped: 2 combinations")
 
 
 def test_no_model_no_recommendation(samples: Samples) -> None:

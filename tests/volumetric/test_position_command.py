@@ -157,8 +157,8 @@ def test_all_components_in_one_file(machine: list[Path], tmp_path: Path, capsys:
     said = " ".join(capsys.readouterr().out.split())
     assert "3 components, 72 profiles of each in 3 recording(s)" in said
     assert "note not taken: EYY_z600_0_um to EYY_z600_550_um" in said
-    assert "Judged on: leave one file out (3 files); settings are chosen again in each" in said
-    assert "cold profile alone EXY: thermal part: it is noise" in said
+    assert "Judged on: leave one file out (3 files); settings are selected again in each fold" in said
+    assert "cold profile only EXY: the thermal part is omitted: it is noise" in said
     models = {m.target: m for m in positionfile.read(output)}
     assert {code: m.powers for code, m in models.items()} == {"EXY": (), "EYY": (1,), "EAY": (0,)}
     assert all(part.accepted for m in models.values() for part in m.models)
@@ -183,8 +183,8 @@ def test_settings_are_told_and_can_be_given(machine: list[Path], capsys: pytest.
     assert run([*arguments, "--slopes", "1", "--no-offset", "--reference-position", "300"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "Chosen by" not in said
-    assert "chosen again" not in said
-    assert "do not turn about 300 mm" in said
+    assert "selected again" not in said
+    assert "do not tilt about 300 mm" in said
     assert run([*arguments, "--slopes", "0"]) == 0
     assert "k1 [um/m] =" not in capsys.readouterr().out
 
@@ -197,7 +197,7 @@ def test_long_formulas_and_many_cycles_are_shortened(
     monkeypatch.setattr(positiontables, "WORST", 1)
     assert run(["position", *map(str, machine), "--component", "EYY", "--model", "ols"]) == 0
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "... and 1 terms more (--json has them)" in said
+    assert "... and 1 more terms (see --json)" in said
     assert "standard errors" not in said
     assert "the 1 worst of 3; RMS over all points in um" in said
     assert said.count(" day0 ") + said.count(" day1 ") + said.count(" day2 ") == 1

@@ -104,7 +104,7 @@ def test_for_people(mill: tuple[str, str], capsys: pytest.CaptureFixture[str]) -
     said = capsys.readouterr().out
     assert "Mill [7], w X' b Z Y (C1) t: " in said
     assert "4 of 32 components are known; assumed to be zero: EYX, EZX, EAX" in said
-    assert "At X 300, Y 0, Z 250 mm, the tip at X 0, Y 0, Z -100 mm" in said
+    assert "At X 300, Y 0, Z 250 mm, tool tip at X 0, Y 0, Z -100 mm from the gauge point" in said
     assert "spindle drift in Z" in said
     assert "straight lines" in said
     assert "length of the error at 125 points over the work volume" in said
@@ -125,7 +125,7 @@ def test_a_point_alone_or_the_volume_alone(mill: tuple[str, str], capsys: pytest
     assert run(["volumetric", mill[0], "--grid", "2"]) == 0
     said = capsys.readouterr().out
     assert "At X" not in said
-    assert "volume: RMS over it" in " ".join(said.split())
+    assert "volume: RMS in the work volume" in " ".join(said.split())
     assert "at 8 points over the work volume" in said
 
 
@@ -142,7 +142,7 @@ def test_a_missing_number_holds_the_state(mill: tuple[str, str], capsys: pytest.
     error = found["course"]["error_um"]
     assert error[300] == error[299] != error[301]
     assert run(["volumetric", machine, "--recording", recording]) == 0
-    assert "in 1 rows an input is missing" in capsys.readouterr().out
+    assert "an input is missing in 1 rows" in capsys.readouterr().out
 
 
 def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -44,7 +44,7 @@ def test_the_page_says_all_of_it(found: Volumetric, tmp_path: Path) -> None:
     assert "X 0 to 600 mm, Y -200 to 200 mm, Z 0 to 500 mm" in text
     assert text.count("<svg") == 6
     assert text.count("<tr") == (1 + 9) + (1 + 3) + (1 + 9) + (1 + 32)
-    assert "Never judged on unseen cycles: EXX, Z0C." in text
+    assert "Not judged on unseen cycles: EXX, Z0C." in text
     worst = found.worst.straight
     assert f"<td>{worst.before.rms:.2f}</td><td>{worst.before.largest:.2f}</td>" in text
     assert f"<td>{worst.lines[0].correction.slope:.2f}</td>" in text
@@ -61,9 +61,9 @@ def test_the_boxes_tell_states_and_scale(found: Volumetric) -> None:
         assert moment.name in said
         size = moment.straight.before
         assert f"RMS {size.rms:.1f} um, largest {size.largest:.1f} um" in said
-    assert said.count("after the straight lines") == 3
-    (scale,) = (t for t in said if "drawn" in t)
-    told = re.fullmatch(r"([\d.]+) um of error: drawn ([\d,]+) times as large", scale)
+    assert said.count("corrected by straight lines") == 3
+    (scale,) = (t for t in said if "magnified" in t)
+    told = re.fullmatch(r"([\d.]+) um of error, magnified ([\d,]+) times", scale)
     assert told is not None
     largest = found.worst.straight.before.largest
     # the largest error is drawn as some share of the longest travel, the scale is not longer than it
@@ -109,7 +109,9 @@ def test_machines_of_fewer_axes_and_of_no_errors(mill: tuple[Machine, Recording]
         assert text.count("<svg") == drawn
     nothing = study(replace(machine, components={}))
     assert page.render(nothing).count("<svg") == 2
-    assert volumetric_tables.headline(nothing).startswith("Largest error in the work volume 0.0 um")
+    assert volumetric_tables.headline(nothing).startswith(
+        "Largest error in the work volume in the reference state: 0.0 um"
+    )
     # what an axis that is not there would have to correct, stays
     sizes = study(two).worst.sizes
     assert sizes["everything"].largest == pytest.approx(3.0, abs=1e-3)

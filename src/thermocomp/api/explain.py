@@ -40,6 +40,6 @@ def explain(model: "ErrorModel | FittedModels | str | Path | Sequence[ErrorModel
     >>> import thermocomp as tc
     >>> fitted = tc.fit(tc.simulate("wessel-milling"), "s1_um", "ols", leave_one="file")
     >>> print(str(tc.explain(fitted)).splitlines()[0])
-    s1_um: ols predicts it [um] from 3 temperatures: these alone, without a memory.
+    s1_um [um]: predicted by ols from 3 temperatures; present values only.
     """
     return explain_one(model) if isinstance(model, ErrorModel) else explain_all(models_of(model))

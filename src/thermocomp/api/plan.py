@@ -134,7 +134,7 @@ class Planned(Result):
     def __str__(self) -> str:
         best = self.next
         why = f" ({best.news})" if best.news else ""
-        found = [f"Next: {best.trial.words}, {best.gain:.2f} um of {self.plan.expected:.2f} um expected{why}."]
+        found = [f"Next: {best.trial.words}; expected gain {best.gain:.2f} um of {self.plan.expected:.2f} um{why}."]
         if self.curve is not None:
             found.append(f"So far: {self.curve.words}.")
         return " ".join([*found, *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])])
@@ -170,7 +170,7 @@ def plan(
     jobs: int = -1,
     progress: Callable[..., Any] = silent,
 ) -> Planned:
-    """Determine how much testing is sufficient, and write the most informative next test as an NC program.
+    """Determine whether more tests are needed, and write the most informative next test as an NC program.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def plan(
     hours : float
         Duration of the next test [h].
     swing : float
-        Largest change of the ambient temperature at the machine within that time [degC]; 0: none.
+        Largest change of the ambient temperature at the machine during the test [degC]; 0: none.
     inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool
@@ -204,7 +204,7 @@ def plan(
     >>> import thermocomp as tc
     >>> planned = tc.plan(tc.simulate("demo"), "z_um", top_speed=6000, curve=False)
     >>> planned.next.trial.words, planned.next.news
-    ('6,000 1/min for 6 h, then a stop as long', 'no run faster than 3,200 1/min')
+    ('6,000 1/min for 6 h, then a stop of equal length', 'no run faster than 3,200 1/min')
     >>> planned.write("next.ngc").name
     'next.csv'
     """

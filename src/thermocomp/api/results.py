@@ -138,7 +138,7 @@ class Compared(Result, Paged):
         )
 
     def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
-        """Return a figure of the errors of all models; or of the course of a model for a target over the unseen blocks.
+        """Return a figure of the errors of all models; or of a model over time, for a target, on the unseen blocks.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class FittedModels(Result):
         return table
 
     def plot(self, target: str | None = None) -> "Figure":
-        """Return a figure of the method's course over the unseen blocks, for the first target or a given one."""
+        """Return a figure of the method over time on the unseen blocks, for the first target or a given one."""
         return _run(self.fitted.comparison.assessments, self.recordings, target or self.fitted.models[0].target, None)
 
     def __str__(self) -> str:
@@ -319,7 +319,7 @@ class Assessed(Result, Paged):
         return frame_of(self.judged.assessments if blocks else self.judged.overall()).drop(columns="deployable")
 
     def plot(self, target: str | None = None) -> "Figure":
-        """Return a figure of the model's course over the recordings, for the first target or a given one."""
+        """Return a figure of the model over time on the recordings, for the first target or a given one."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
 
     def page(self) -> str:

@@ -130,9 +130,10 @@ def select(
     recordings, targets
         As for `compare`.
     method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
-        Selection method (:doc:`/methods`). pareto: error on unseen cycles against the number of sensors; subsets: exact
-        best subset of every size; grouping: correlation grouping (Hwang); partial-f and stepwise: by partial F
-        (stepwise 2017, Chen); ace: by maximal correlation (Wessel).
+        Selection method; see the page :doc:`/methods` of the manual. pareto: trade-off between the error on unseen
+        cycles and the number of sensors; subsets: exact best subset of every size; grouping: correlation grouping
+        (Hwang); partial-f and stepwise: partial F tests (of the stepwise 2017 paper, and of Chen); ace: maximal
+        correlation (Wessel).
     inputs, split, leave_one, absolute, starts, zero_over, mapping, jobs, scheduler, progress
         As for `compare`.
     **settings

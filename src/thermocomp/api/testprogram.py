@@ -84,7 +84,7 @@ def write_program(trial: Trial, dialect: Dialect, every: float = 0.0) -> str:
     running = 0.0
     for part in stretches(trial, every):
         if part.first:
-            what = f"{part.speed:.0f} 1/min" if part.speed else "the spindle is stopped"
+            what = f"{part.speed:.0f} 1/min" if part.speed else "spindle stopped"
             lines.append(_comment(f"{clock(part.start)} {what} for {_length(trial, part)}", dialect))
         if every:
             lines += ["M5"] * (running > 0) + _measure(dialect)
@@ -115,19 +115,21 @@ def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -
     text = io.StringIO()
     sheet = csv.writer(text, lineterminator="\n")
     names = [c.name for c in channels if c.quantity != "spindle_speed"]
-    sheet.writerow(["time_min", "spindle_rpm", *map(defuse, names), "what to do"])
+    sheet.writerow(["time_min", "spindle_rpm", *map(defuse, names), "action"])
     parts = list(stretches(trial, every))
     before = 0.0
     for part in parts:
-        do = "write down all"
+        do = "record all values"
         if part.first and part.start:
             do += f", then {f'run at {part.speed:.0f} 1/min' if part.speed else 'stop the spindle'}"
         if trial.kind == "room" and part.first and part.start:
-            do = "write down all, then let the room temperature change: heating, doors, night"
+            do = "record all values, then let the room temperature change: heating, doors, night"
         # the speed of a row is that of the preceding period
         sheet.writerow([f"{part.start / 60:g}", f"{before:g}", *[""] * len(names), do])
         before = part.speed
-    sheet.writerow([f"{trial.duration / 60:g}", f"{before:g}", *[""] * len(names), "write down all: the end"])
+    sheet.writerow(
+        [f"{trial.duration / 60:g}", f"{before:g}", *[""] * len(names), "record all values: end of the test"]
+    )
     return text.getvalue()
 
 
@@ -211,13 +213,13 @@ def _head(trial: Trial, dialect: Dialect, every: float) -> Iterator[str]:
         yield "O1001 (THERMAL TEST)"
     yield _comment("thermal test, planned by thermocomp", dialect)
     yield _comment(trial.words.replace(",", ""), dialect)
-    yield _comment(f"in all {clock(trial.duration)} h, no axis moves", dialect)
-    yield _comment("before the start: machine rested, spindle free, door shut", dialect)
+    yield _comment(f"total {clock(trial.duration)} h, no axis moves", dialect)
+    yield _comment("before the start: machine rested, spindle free to turn, door closed", dialect)
     if trial.kind == "room":
-        yield _comment("the temperature of the room has to change meanwhile", dialect)
+        yield _comment("the room temperature must change during the test", dialect)
     if every and dialect == "linuxcnc":
         yield "o<probe> sub"
-        yield _comment("fill in: approach, G38.2, write down, retract; as written, nothing moves", dialect)
+        yield _comment("fill in: approach, G38.2, record the value, retract; as written, nothing moves", dialect)
         yield "o<probe> endsub"
     yield "G97"
     yield "M5"

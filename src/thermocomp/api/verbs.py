@@ -56,7 +56,7 @@ def compare(
     targets : str or sequence of str, optional
         Displacement channels to predict. Default: all of the first recording.
     models : str, estimator, or sequence of them
-        Methods to compare, or all: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
+        Methods to compare, or ``all``: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
         mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
 
         In Python also estimators of any kind: an estimator of thermocomp with custom settings, any regressor of
@@ -66,39 +66,41 @@ def compare(
     split : str, optional
         Chronological train/test split: fractions of the rows such as ``0.75/0.25``, or durations such as ``20h/8h``.
     leave_one : {'cycle', 'day', 'file'}, optional
-        Unit left out of fitting and judged in turn: each thermal cycle (default), each day (the recordings need time
-        stamps), or each recording.
+        What is left out of the fit and judged, in turn: each thermal cycle (default), each day (the recordings need
+        time stamps), or each recording.
     absolute : bool
         Use absolute temperatures. Default: temperatures relative to the start of each test.
     starts : Start or sequence of Start, optional
         Initial thermal state of all recordings, or of each one, such as ``Start("continued", earlier=(monday,))``.
         Default: determined from the recordings. See `thermocomp.recordings.starts.Start`.
     zero_over : float
-        Duration at the start of each test, with the spindle stopped, over which the zero is averaged [s]; 0: the first
-        row is the zero.
+        Averaging time of the zero (reference temperatures) at the start of each test, with the spindle stopped [s]; 0:
+        the first row is the zero.
     mapping : str, Path or Mapping, optional
         TOML mapping file: role and unit of each column.
     support : {'clip', 'hold', 'fade'}
-        Behaviour of a model outside its training range: clip its inputs, hold its last value, or fade to zero.
+        Behaviour of a model outside its training range: clip its inputs, hold its last output, or fade its output to
+        zero.
     margin : float
-        Widening of the training range of each input, as a fraction of its span.
+        Margin by which the training range of each input is extended at both ends, as a fraction of the range.
     robustness : bool
-        Also replay the models with noise and lost sensors; a model that is then worse than no compensation is unproven.
-        Without this check, which is faster, no model is accepted.
+        Also replay the models with sensor noise and lost sensors: a model that is then worse than no compensation is
+        unproven. Computing is faster without this check, but then no model is accepted.
     primary : str, optional
-        Primary method, named before judging: it is judged as if it were the only one; the results of the others are
-        corrected for the number of methods tried. Default: the recommended method, which is chosen again without each
-        cycle.
+        Primary method, chosen before the evaluation: its result is not corrected for multiple comparisons, those of the
+        other methods are corrected for the number of methods tried. Default: the recommended method, selected again in
+        each fold, with the left-out cycle excluded.
     harm_margin : float, optional
-        Tolerated degradation in a single cycle, day or file, stated before judging [um]. Default: three times the
-        probe's noise or 5 % of the largest drift, at most 2 um.
+        Tolerated degradation in a single cycle, day or file, set before the evaluation [um]. Default: the larger of
+        three times the probe's noise and 5 % of the largest drift, limited to 2 um.
     limits : Limits or None
-        Limits of the compensator that is judged with the models; None: the models are judged alone.
+        Limits of the corrections, applied while the models are judged; None: the models are judged without a
+        compensator.
     jobs : int
         Number of parallel processes; -1: one per core.
     scheduler : str, optional
         Address of a Dask scheduler whose workers replace the local processes, such as ``tcp://192.168.1.20:8786``; see
-        :doc:`/many_recordings`.
+        the page :doc:`/many_recordings` of the manual.
     progress : callable
         Called with a line of text after each task; see `thermocomp.api.keywords.Listener`.
 
@@ -187,17 +189,17 @@ def fit(
     scheduler: str | None = None,
     progress: Callable[[str], None] = silent,
 ) -> FittedModels:
-    """Fit a model, judge it on unseen thermal cycles, and write it with its honest error.
+    """Fit a model, judge it on unseen thermal cycles, and write it with its honest error, the error on these cycles.
 
-    The method is first judged on unseen cycles, then fitted to all data. A refused model is written too, marked as
-    refused, so that it cannot be run. An unproven one runs in shadow only.
+    The method is first judged on unseen cycles, then fitted to all data. A refused model is also written, but marked as
+    refused, and cannot be run. An unproven one runs in shadow only: its corrections are computed but not applied.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
     model : str or estimator
-        Method to fit: any of ``thermocomp compare`` except gp.
+        Method to fit: any method of ``thermocomp compare`` except gp.
 
         In Python also an estimator that can be frozen: an estimator of thermocomp, or a Pipeline of selectors and such
         an estimator.
@@ -205,9 +207,9 @@ def fit(
         As for `compare`.
     tilt : sequence of str, optional
         Tilts to predict as well, each defined by two probes and their distance, such as ``A0C=y1_um:y2_um:100mm``
-        (rotation about X, the probe at the tip first) or ``B0C=x1_um:x2_um:100mm`` (about Y).
+        (rotation about X; the probe at the tip comes first) or ``B0C=x1_um:x2_um:100mm`` (about Y).
     limits : Limits
-        Limits of the compensator that is judged with the models.
+        Limits of the corrections, applied while the models are judged.
     accept_unproven : str, optional
         Person who approves the use of an unproven model, and the reason, such as ``"M. Weber, trial on machine 7"``.
         Stored in the model file and shown wherever the model is used. A refused model never runs.
@@ -275,9 +277,9 @@ def assess(
     probing: str | Probings | None = None,
     progress: Callable[[str], None] = silent,
 ) -> Assessed:
-    """Judge a model file on recordings: per cycle, with noise, with each sensor lost, outside its training range.
+    """Judge a model file on recordings: per cycle, with sensor noise, with each sensor lost, outside training range.
 
-    Rows used to train a model are recognised by their fingerprints, in whatever file they are: they are excluded and
+    Rows used to train a model are recognised by their fingerprints, whatever file they are in; they are excluded and
     counted.
 
     Parameters
@@ -287,11 +289,11 @@ def assess(
     recordings, starts, mapping, harm_margin
         As for `compare`.
     limits : Limits
-        Limits of the compensator that is judged with the models.
+        Limits of the corrections, applied while the models are judged.
     probing : str or Probings, optional
-        Simulated probing of the tool point during operation, such as ``every 2 h``, or ``every 30 min, 0.3 um`` with
-        the repeatability of the probe (standard deviation; default 0.5 um): each probing corrects the models from then
-        on. Default: no probing.
+        Simulated probing of the tool point during operation, such as ``"every 2 h"``, or ``"every 30 min, 0.3 um"`` to
+        specify the repeatability of the probe (standard deviation; default 0.5 um). Each probing corrects the models
+        from then on. Default: no probing.
     progress : callable
         Called with a line of text per model.
 

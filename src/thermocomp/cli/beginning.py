@@ -23,16 +23,17 @@ class Beginning:
     Parameters
     ----------
     start : str
-        Initial state. cold: zeroed at rest at the start; continued: continued from the files of --continues; rezeroed:
-        relative to the start, on a machine that may be warm; known: relative to the temperatures of --zero.
+        Initial thermal state. cold: at rest at the start, which is the zero (reference); continued: continued from the
+        files of --continues, with their zero; rezeroed: all values are relative to the start, where the machine may be
+        warm; known: temperatures are relative to those of --zero. Default: determined from the recordings.
     continues : list of Path
-        Earlier files of the same test, in chronological order. With --start rezeroed they give the state of the
-        machine, and all values are relative to the start of the recording.
+        Earlier files of the same test, in chronological order. With --start rezeroed they provide only the thermal
+        history: all values are relative to the start of the recording.
     gap : float
         Time from the end of each file of `--continues` to the start of the next one [s]. Default: from the time stamps,
         else one sampling interval.
     zero : str
-        Temperatures of the known zero, such as t1_C=20.1,t2_C=20.4, or a recording that starts with them.
+        Temperatures of a known zero, such as t1_C=20.1,t2_C=20.4, or a recording at whose start they were measured.
     """
 
     start: Literal["cold", "continued", "rezeroed", "known"] | None = None

@@ -39,7 +39,8 @@ def map(
         Output mapping file (.toml). Default: the mapping is printed.
     yes : bool
         Ask no questions: use the best guess, and repair what `check` reports as trouble. Settings that change the
-        duration of a recording, such as the unit of time or the order of day and month, are not guessed but refused.
+        duration of a recording, such as the unit of time or the order of day and month, are never guessed: a file that
+        needs them is refused.
     overwrite : bool
         Overwrite an existing file.
     json : bool

@@ -19,12 +19,12 @@ OptionalOutput = Annotated[Path | None, Parameter(name=["--output", "-o"])]
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class LeaveOneOut:
-    """Unit that is left out of fitting and judged in turn.
+    """Cycles, days or files that are left out of the fit and judged, in turn.
 
     Parameters
     ----------
     leave_one_cycle_out : bool
-        Leave out each thermal cycle in turn and judge on it (default).
+        Leave out each thermal cycle in turn and judge on it. Default if no other split is given.
     leave_one_day_out : bool
         Leave out each day in turn and judge on it; the recordings need time stamps.
     leave_one_file_out : bool
@@ -58,7 +58,7 @@ class LeaveOneOut:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class CompensatorOptions:
-    """Limits of the compensator that is judged with a model.
+    """Limits of the corrections.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class CompensatorOptions:
     rate : float
         Fastest change of a correction [um/s].
     dead_band : float
-        Dead band of a correction: smaller changes are not made [um].
+        Dead band of a correction: smaller changes are not applied [um].
     """
 
     magnitude: float = Limits.magnitude

@@ -45,8 +45,8 @@ def plan(
         Time between two measurements with a touch probe, for which the program stops the spindle [min]; 0: a logger
         measures continuously.
     running : bool
-        Check whether the current spindle run or stop of a test that is still running may end; the recording is that of
-        the test up to now.
+        For a test in progress, of which the recording up to now is given: check whether the current spindle run or stop
+        may end.
 
     Returns
     -------
@@ -70,23 +70,23 @@ def _show_running(found: RunningTest) -> None:
         Column("now", lambda s: s[1].change, ".1f", "um"),
         Column("steady state", lambda s: s[1].final, ".1f", "um"),
         Column("+- (k=2)", lambda s: s[1].uncertainty, ".1f", "um"),
-        Column("enough", lambda s: s[1].limit, ".1f", "um"),
+        Column("required", lambda s: s[1].limit, ".1f", "um"),
     )
-    print_table(Layout(columns, found.states, caption="counted from the start of the run or stop"), console)
+    print_table(Layout(columns, found.states, caption="relative to the start of the run or stop"), console)
     console.print(f"[{'green' if found.may_stop else 'yellow'}]{words(found.words)}[/]", soft_wrap=True)
 
 
 def _show(found: Planned, files: list[Path]) -> None:
     columns = (
         Column("next test", lambda c: c.trial.words),
-        Column("would gain", lambda c: c.gain, ".2f", "um"),
-        Column("expected error in the test", lambda c: c.doubt, ".2f", "um"),
+        Column("expected gain", lambda c: c.gain, ".2f", "um"),
+        Column("expected error during the test", lambda c: c.doubt, ".2f", "um"),
         Column("new conditions", lambda c: c.news),
     )
     p = found.plan
     caption = (
-        f"{p.hours:g} h each, speeds up to {p.top_speed:,.0f} 1/min; expected error over all of them {p.expected:.2f} "
-        "um now: calculated, not judged"
+        f"{p.hours:g} h each, speeds up to {p.top_speed:,.0f} 1/min; expected error over all of them: {p.expected:.2f} "
+        "um now (calculated, not verified on data)"
     )
     print_table(Layout(columns, p.candidates, caption=caption), console)
     if found.curve is not None:

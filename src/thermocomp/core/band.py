@@ -77,7 +77,10 @@ class Band:
         rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
         if not self.speeds:
             rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
-        return f"{self.words}: half-width at least {rest} at rest and {run} running, more where its structures differ"
+        return (
+            f"{self.words}: half-width at least {rest} at rest and {run} with the spindle running, more where the "
+            "averaged models disagree"
+        )
 
     def turning(self, change: FloatArray) -> NDArray[np.bool_]:
         """Return whether the spindle turns, for input states of shape (..., n_inputs)."""

@@ -239,14 +239,14 @@ def _sensor(model: ErrorModel, name: str, settled: float | None, bound: float | 
 def _zero(model: ErrorModel) -> str:
     own = [i for i in model.inputs if i.rezero]
     if not own:
-        return "nothing: its inputs are absolute"
+        return "none, all inputs are absolute"
     zeroing = model.zeroing
     if not zeroing.at_rest:
         return "the first reading after a start"
     what = "temperatures" if all(i.quantity == "temperature" for i in own) else ", ".join(i.name for i in own)
     turning = f" ({_span(zeroing.otherwise)} if it turns)" if zeroing.speed else ""
     rest = " while the spindle is stopped" if zeroing.speed else ""
-    return f"{what} from their mean over the first {_span(zeroing.at_rest)} after a start{rest}{turning}"
+    return f"{what} are relative to their mean over the first {_span(zeroing.at_rest)} after a start{rest}{turning}"
 
 
 def _outside(model: ErrorModel) -> str:
@@ -265,7 +265,7 @@ def _covered(model: ErrorModel) -> str:
         return ""
     parts = [f"{v.hours:.1f} h, {v.units} cycles or tests, {v.independent} of them distinct"]
     if v.speeds:
-        parts.append(f"{len(v.speeds)} spindle speeds of {v.speeds[0]:.0f} to {v.speeds[-1]:.0f} 1/min")
+        parts.append(f"{len(v.speeds)} spindle speeds from {v.speeds[0]:.0f} to {v.speeds[-1]:.0f} 1/min")
     if v.ambient:
         parts.append(f"{v.ambient_channel} {v.ambient[0]:.1f} to {v.ambient[1]:.1f} degC")
     if v.start:
@@ -276,34 +276,36 @@ def _covered(model: ErrorModel) -> str:
 def _lines(e: Explanation) -> list[str]:
     heat = [s for s in e.sensors if s.quantity == "temperature"]
     other = [s.name for s in e.sensors if s.quantity != "temperature"]
-    past = "these and their past" if e.remembers else "these alone, without a memory"
+    past = "present and past values" if e.remembers else "present values only"
     what = [f"{len(heat)} temperature{'s' if len(heat) > 1 else ''}"] if heat else []
     lines = [
-        f"{e.target}: {e.method or e.family} predicts it [{e.unit}] from {' and '.join([*what, *other]) or 'nothing'}: "
-        f"{past}.",
+        f"{e.target} [{e.unit}]: predicted by {e.method or e.family} from "
+        f"{' and '.join([*what, *other]) or 'nothing'}; {past}.",
     ]
     if any(s.bound is not None for s in e.sensors):
         each = ", ".join(f"{s.name} {s.bound:.1f}" for s in e.sensors if s.bound is not None)
-        lines.append(f"Adds at most [{e.unit}]: {each}.")
-    lines.append(f"Zero: {e.zero}.")
+        lines.append(f"Largest contribution of each input [{e.unit}]: {each}.")
+    lines.append(f"Zero (reference): {e.zero}.")
     if e.rms is not None and e.none_rms is not None:
         lines.append(
-            f"Honest error: {e.rms:.2f} {e.unit} RMS, largest {e.max_abs:.2f}, on unseen cycles; without compensation "
+            f"Honest error (on unseen cycles): {e.rms:.2f} {e.unit} RMS, largest {e.max_abs:.2f}; without compensation "
             f"{e.none_rms:.2f} RMS."
         )
     lines.append(f"Verdict: {e.word}, {e.reason}.")
-    lines.append(f"Band: {e.band or 'none'}.")
-    lines.append(f"Judged over: {e.covered or 'not known'}.")
-    lines.append(f"Outside its range: {e.outside}.")
+    lines.append(f"Uncertainty band: {e.band or 'none'}.")
+    lines.append(f"Judged conditions: {e.covered or 'not known'}.")
+    lines.append(f"Outside the trained range: {e.outside}.")
     watched = [s for s in e.sensors if s.watched]
     if watched:
         lines.append(
-            f"A missing temperature is detected at once; one that jumped, drifted or is stuck, {_span(LASTING)} after "
-            "exceeding its limit. It is replaced by its prediction from the other temperatures and the speed:"
+            "A missing temperature is detected immediately; one that has jumped, drifted or is stuck is detected "
+            f"{_span(LASTING)} after it exceeds its limit. It is replaced by its prediction from the other "
+            "temperatures and the spindle speed. Limits and errors:"
         )
     else:
         lines.append(
-            "Sensors are not watched: a reading with a missing value is rejected; a wrong value is not detected:"
+            "Sensors are not monitored: a reading with a missing value is rejected; a wrong value is not detected. "
+            "Errors:"
         )
     lines += [f"  {_sensor_line(s, e.unit)}" for s in e.sensors]
     if e.pairs[0]:
@@ -312,24 +314,27 @@ def _lines(e: Explanation) -> list[str]:
             "them."
         )
     elif len(watched) > 1:
-        lines.append("Two sensors lost at once: not judged for so many sensors; the correction is held, then fades.")
+        lines.append(
+            "Two sensors lost at once: not judged, because there are too many pairs; the correction is held, "
+            "then fades."
+        )
     return lines
 
 
 def _sensor_line(s: SensorExplanation, unit: str) -> str:
     if s.quantity != "temperature":
         left = f" ({s.lost:.2f} {unit} if it read zero)" if s.lost is not None else ""
-        return f"{s.name}: not watched; without it the correction is held, then fades{left}"
-    lost = f"{s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
+        return f"{s.name}: not monitored; without it the correction is held, then fades{left}"
+    lost = f"error {s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
     parts = []
     if s.watched and s.off is not None and s.jump is not None and s.moved is not None and s.pace is not None:
-        shift = f"  (a drift up to this limit shifts the output by {s.undetected:.2f} {unit})" if s.undetected else ""
+        shift = f" (a drift up to this limit shifts the output by {s.undetected:.2f} {unit})" if s.undetected else ""
         still = f" or for {_span(s.still)}" if s.still is not None else ""
         parts.append(
-            f"jump over {s.jump:.1f} degC in {_span(s.pace)}; off by {s.off:.1f} degC{shift}; stuck while its "
-            f"prediction moves {s.moved:.1f} degC{still}"
+            f"jump by more than {s.jump:.1f} degC in {_span(s.pace)}; drift by {s.off:.1f} degC{shift}; stuck while "
+            f"its prediction changes by {s.moved:.1f} degC{still}"
         )
-    parts.append(lost if s.runs_on else f"would leave {lost}: held, then fades")
+    parts.append(lost if s.runs_on else f"{lost}; the correction is held, then fades")
     return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
 
 

@@ -68,9 +68,10 @@ def write_values(
     parts = [
         f"FUNCTION_BLOCK {quoted(name, scl)}",
         *(SCL if scl else []),
-        f"(* What the controller takes, by axis: {', '.join(f'{k}: {d.letter}' for k, d in enumerate(drives))} *)",
+        f"(* Values for the controller, by axis: {', '.join(f'{k}: {d.letter}' for k, d in enumerate(drives))} *)",
         *(f"(* {v.name}: {v.about} *)" for v in taken.values()),
-        "(* direction: 1.0 if the controller adds it to the command, -1.0 if it takes it off. UNCONFIRMED: try it *)",
+        "(* direction: 1.0 if the controller adds the value to the command, -1.0 if it subtracts it. UNCONFIRMED: "
+        "test it *)",
         section(
             "VAR_INPUT",
             {

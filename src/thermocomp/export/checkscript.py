@@ -23,7 +23,7 @@ def answers(text, rows):
 
 FANUC = '''
 def run(lines, numbers):
-    """Run the few words of a macro that this one has."""
+    """Run the few instructions that occur in this macro."""
     def value(words):
         words = re.sub(r"#(\\d+)", lambda m: f"numbers.get({m[1]}, None)", words.replace("#0", "None"))
         for was, becomes in (("EQ", " == "), ("NE", " != "), ("LT", " < "), ("GT", " > "), ("[", "("), ("]", ")")):
@@ -61,14 +61,14 @@ def answers(text, rows):
             if value:
                 numbers[int(number[1:])] = float(value)
         before = None
-        while numbers != before:  # calls, until it has arrived
+        while numbers != before:  # call until the correction no longer changes
             before = dict(numbers)
             run(lines, numbers)
         place = {axis: int(number[1:]) for number, axis in forces.items()}[row["axis"]]
         yield 1e3 * numbers[place], float(row["correction_um"])
 '''
 
-_SCRIPT = '''"""Run {name}_vectors.csv through {file}: 0 if all agree. A file named behind it is read in its place."""
+_SCRIPT = '''"""Compare {file}, or a file given as argument, with {name}_vectors.csv: exit code 0 if all agree."""
 
 import csv
 import re

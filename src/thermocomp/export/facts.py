@@ -34,7 +34,7 @@ class Facts:
         """Return lines of text about the origin of the export: model file, version, date."""
         return [
             f"Model: {self.source}, SHA-256 {self.sha256}",
-            f"Written by thermocomp {self.version} on {self.date}; change nothing here, export again",
+            f"Written by thermocomp {self.version} on {self.date}; do not edit, export again instead",
             *(f"Left out: {target}: {why}" for target, why in self.left_out.items()),
         ]
 
@@ -47,10 +47,11 @@ class Facts:
         return [
             *found,
             *self.origin(),
-            f"Limits: {limits.in_words()}; nothing older than {limits.reading_age:g} s is used; without a reading a "
-            f"correction stays for {limits.hold:g} s and then goes to zero with a time constant of {limits.fade:g} s",
-            "Sign: a correction [um] is what the controller adds to the commanded position: minus the deviation, which "
-            "is actual minus commanded",
+            f"Limits: {limits.in_words()}; readings older than {limits.reading_age:g} s are not used; without readings "
+            f"a correction is held for {limits.hold:g} s, then decays to zero with a time constant of {limits.fade:g} "
+            "s",
+            "Sign: a correction [um] is added to the commanded position by the controller; it is minus the deviation, "
+            "which is actual minus commanded position",
             "Units: temperatures in degC, spindle speed in 1/min, positions in mm, time in s",
         ]
 

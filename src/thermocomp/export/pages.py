@@ -9,36 +9,39 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing
     sensors = (
-        "\n\nThe temperatures are watched: what is missing, stuck, off, stepped or swapped is replaced by what the "
-        f"others say, if the model was judged without it; otherwise the correction holds and fades. `{of}fault[k]`, "
-        f"of {', '.join(tables.sensors)}: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped."
+        "\n\nThe temperature sensors are monitored: a sensor that is missing, stuck, off (far from its prediction), "
+        "stepped or swapped is replaced by its prediction from the others, if the model was judged without it; "
+        f"otherwise the correction is held, then fades. `{of}fault[k]`, of {', '.join(tables.sensors)}: 0 good, 1 "
+        "missing, 2 stepped, 3 stuck, 4 off, 5 swapped."
         if tables.sensors
-        else "\n\nThe temperatures are not watched: one that is not plausible stops the correction, a wrong one not."
+        else "\n\nThe temperature sensors are not monitored: an implausible value stops the correction; a plausible "
+        "but wrong value is not detected."
     )
     positions = zip(tables.targets, tables.values["position"], strict=True)
     return {
         "inputs": len(tables.channels),
         "values": "\n".join(f"| `value[{k}]` | {c.name} | {c.unit} |" for k, c in enumerate(tables.channels)),
-        "line": "add `slope[k]` [um/m] by the distance from" if slopes else "the same at every position",
+        "line": "plus `slope[k]` [um/m] times the distance from" if slopes else "independent of position",
         "corrections": "\n".join(
             f"| `correction[{k}]` [um] | {t} | {f'{p:g} mm' if slopes else 'yes'} |"
             for k, (t, p) in enumerate(positions)
         ),
-        "zero": f"Temperatures count from the mean over the first {zeroing.otherwise:g} s, or over "
-        f"{zeroing.at_rest:g} s while the spindle is stopped; until then the correction stays where it is."
+        "zero": f"Temperatures are relative to their mean over the first {zeroing.otherwise:g} s, or over "
+        f"{zeroing.at_rest:g} s while the spindle is stopped; until then the correction does not change."
         if tables.sizes["has_zero"]
-        else "Nothing counts from the start.",
-        "geometry": "Only what temperature changes along an axis is corrected: its profile stays a table of the "
+        else "No input is relative to the start.",
+        "geometry": "Only the thermal change of an axis error is corrected; its profile stays a table of the "
         "controller.\n\n"
         if slopes
         else "",
-        "sign": "Give the controller +20 um by hand in place of a correction, the spindle standing and an indicator on "
-        "the\naxis: it has to move by 0.02 mm in its positive direction, and back with 0. If it goes the other way, "
-        "turn the sign\nround where you hand the correction over, nowhere else. Temperatures that are made up are no "
-        "trial: the watch does not\nbelieve them.",
-        "status": f"`{of}status[k]` says how a correction is: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow; "
-        f"`{of}rejected`\nwhy a reading was not used: 0 it was, 1 its time, 2 a value missing or not plausible, 3 no "
-        f"start of a machine;\n`{of}outside` how many inputs are beyond the trained range.",
+        "sign": "With the spindle stopped and a dial indicator on the axis, send +20 um to the controller instead of a "
+        "correction:\nthe axis must move by 0.02 mm in its positive direction, and back with 0. If it moves the other "
+        "way, reverse the sign\nwhere the correction is sent to the controller, nowhere else. Do not test with made-up "
+        "temperatures: the sensor\nmonitoring rejects them.",
+        "status": f"`{of}status[k]` is the state of a correction: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow "
+        f"(computed, not applied).\n`{of}rejected` is the reason why a reading was not used: 0 it was used, 1 its "
+        "time, 2 a missing or implausible value,\n3 temperatures that do not fit the start of a machine. "
+        f"`{of}outside` is the number of inputs beyond the trained range.",
         "sensors": sensors,
         "hold": compensator.limits.hold,
     }

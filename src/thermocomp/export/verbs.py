@@ -93,10 +93,10 @@ def export(
 ) -> ExportedCode:
     """Export the models of a file as code for another controller, with test vectors and instructions.
 
-    The code works like ``thermocomp serve``: it averages the zero, rejects implausible readings, replaces a failed
-    sensor, holds and fades the correction in time, and applies the limits. An ONNX graph is the model alone, with a
-    program that runs it inside such a compensator. A refused model is not exported; the correction of an unproven one
-    stays zero.
+    The code works like ``thermocomp serve``: it averages the zero (reference temperatures), rejects implausible
+    readings, replaces a failed sensor, holds and fades the correction in time, and applies the limits. An ONNX graph is
+    the model alone, with a program that runs it inside such a compensator. A refused model is not exported; the
+    correction of an unproven one stays zero.
 
     klipper, heidenhain and fanuc support simpler models only: the best one of these is fitted to recordings, judged on
     unseen cycles next to the full model, and written with the loss of accuracy.
@@ -107,11 +107,12 @@ def export(
         Model file from ``thermocomp fit`` or ``thermocomp position``.
     to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
         Output format. c99: a header and a source file in C99, for a DSP, a PLC or a computer; st: a function block in
-        structured text, IEC 61131-3; siemens, beckhoff: the same with the parameters of their temperature compensation;
-        linuxcnc: the C99 as a HAL component, and a HAL file that moves X, Y and Z; onnx: each model as a graph, for a
-        computer with an ONNX runtime; klipper: its z_thermal_adjust; heidenhain: a formula; fanuc: a macro.
+        structured text, IEC 61131-3; siemens, beckhoff: the same, with the parameters of the temperature compensation
+        of these controllers; linuxcnc: the C99 code as a HAL component, and a HAL file that corrects X, Y and Z; onnx:
+        each model as a graph, for a computer with an ONNX runtime; klipper: settings of z_thermal_adjust; heidenhain: a
+        formula; fanuc: a macro.
     recordings : Recording, path, DataFrame, or sequence of them, optional
-        CSV, XLSX or Parquet files on which the model is reduced, for klipper, heidenhain and fanuc; each one is a
+        CSV, XLSX or Parquet files to which the simpler model of klipper, heidenhain and fanuc is fitted; each one is a
         separate test.
     name : str
         Name of the files and functions, after the prefix ``tc_``.

@@ -11,14 +11,16 @@ from thermocomp.iso230.thermaltest import Figures, Targets, ThermalCurve, Therma
 from thermocomp.judging.choice import Cell, Table
 from thermocomp.judging.settling.settling import Settling
 
-_CAPTION_60 = "Counted from the start of the test; rows averaged over {minutes:.3g} min."
-_CAPTION_U = " ±: expanded uncertainty (k = 2) due to noise, including its serial correlation within that time."
+_CAPTION_60 = "Relative to the start of the test; rows averaged over {minutes:.3g} min."
+_CAPTION_U = (
+    " ±: expanded uncertainty (k = 2) due to noise, including the serial correlation of the noise within that time."
+)
 _WORDS = {
-    ">": "; > where the curve has not settled: it is later",
-    "still": "; still: its averages do not change by more than their noise",
-    "faint": "; faint: it changes, but too little above its noise to determine a time",
-    "returns": "; returns: it comes back before",
-    "peaks": "; peaks: it overshoots its last value, then settles back",
+    ">": "; >: the curve has not settled, t90 is later",
+    "still": "; still: the averaged curve does not change by more than its noise",
+    "faint": "; faint: the change is too close to the noise to determine a time",
+    "returns": "; returns: the curve ends closer to its start than to its extreme",
+    "peaks": "; peaks: the curve overshoots, then settles back to its last value",
 }
 #: label of the residual of a curve with a model
 WITH = "with model"
@@ -46,11 +48,16 @@ def _curves(test: ThermalTest, title: str, curves: Sequence[ThermalCurve]) -> Ta
     about = _CAPTION_60.format(minutes=max(c.course.noise.window for c in curves) / 60) + _CAPTION_U
     if test.kind == "etve":
         columns: tuple[str, ...] = ("", "range, 60 min", "range, all", "largest", "at the end")
-        return Table(title=title, columns=columns, rows=tuple(rows), caption="Range, all: the ETVE. " + about)
+        return Table(
+            title=title,
+            columns=columns,
+            rows=tuple(rows),
+            caption="The range over the whole test (all) is the ETVE. " + about,
+        )
     hours = f"{test.running / 3600:.3g} h"
     columns = ("", "range, 60 min", f"range, {hours}", "range, all", "at 60 min", f"at {hours}", "largest", "cool-down")
     ends = "The drives stop" if test.stop < test.end else "The recording ends"
-    caption = f"{about} {ends} at {hours}. t90: to 90 % of the change up to then"
+    caption = f"{about} {ends} at {hours}. t90: time to 90 % of the change up to then"
     told = {cell.split()[0] for c in curves for cell in _settled(test, c) if cell}
     caption += "".join(text for word, text in _WORDS.items() if word in told) + "."
     return Table(title=title, columns=(*columns, "t90 [min]"), rows=tuple(rows), caption=caption)
@@ -118,7 +125,7 @@ def _slopes(test: ThermalTest, targets: Targets) -> Table:
         title=title,
         columns=("", "at 60 min", *hours),
         rows=tuple(rows),
-        caption="Change of the length, per metre of it.",
+        caption="Change of length per metre.",
     )
 
 
@@ -130,14 +137,15 @@ def time_constant_tables(settlings: Sequence[Settling]) -> tuple[Table, ...]:
         several = sum(p.kind == phase.kind for p in dict.fromkeys(s.phase for s in settlings)) > 1
         rows = tuple(_time_constants(s) for s in mine)
         title = f"Time constants: {phase.kind}{f' {phase.number}' if several else ''} [min]"
-        columns = ("", "change", "t63", "t90", "tau", "R2", "fast", "slow", "R2 of both")
+        columns = ("", "change", "t63", "t90", "tau", "R2", "fast", "slow", "R2 of two")
         caption = (
-            "change, t63, t90: read from the averaged curve; ±: expanded uncertainty (k = 2) due to noise; > where it "
-            "has not settled at the end; still: its averages do not change by more than their noise; faint: it "
-            "changes, but too little above its noise to determine a time; returns: it comes back before the end; "
-            "peaks: it overshoots its last value, then settles back. tau: of one exponential, fast and slow: of two, "
-            "where two are justified; each with its standard error, in brackets if it is longer than the phase or its "
-            "standard error exceeds half of it."
+            "change, t63, t90: read from the averaged curve; ±: expanded uncertainty (k = 2) due to noise; >: the "
+            "curve has not settled at the end; still: the averaged curve does not change by more than its noise; "
+            "faint: the change is too close to the noise to determine a time; returns: the curve ends closer to its "
+            "start than to its extreme; peaks: the curve overshoots, then settles back to its last value. tau: time "
+            "constant of a single exponential; fast, slow: of a sum of two exponentials, if two are justified; with "
+            "standard errors, in brackets if the time constant is longer than the phase or its standard error exceeds "
+            "half the value."
         )
         tables.append(Table(title=title, columns=columns, rows=rows, caption=caption))
     return tuple(tables)

@@ -89,14 +89,14 @@ def iso230(
         Type of the tests: etve (machine at rest), spindle, or axis. Default: determined from the recordings: spindle if
         the spindle turns, else axis if an axis moves, else etve.
     distance : str, optional
-        Distance between the probes x1 and x2, and y1 and y2, such as "100 mm". Default: none, no tilt is evaluated.
+        Distance between the probes x1 and x2, and y1 and y2, such as "100 mm". Without it, no tilt is evaluated.
     pairs : sequence of str, optional
         Probe pairs with other names: probe at the tip of the test bar, probe nearer to the spindle, and their distance,
         such as x_front:x_rear:100mm.
     ambient : str, optional
         Channel of the ambient temperature. Default: the first whose name contains air, ambient or room.
     model : ErrorModel, FittedModels, path of a model file, or sequence of ErrorModel, optional
-        Model file from thermocomp fit; the residual of each displacement with this model is reported, too.
+        Model file from thermocomp fit; the residual of each displacement with this model is also reported.
     limits : Limits
         Limits of the compensator: the residual with the compensator is reported, not that of the model alone.
     starts : Start or sequence of Start, optional

@@ -40,21 +40,22 @@ class Settings:
     threshold : float
         grouping: correlation above which a sensor joins a group.
     unsigned : bool
-        grouping: compare the magnitudes of correlations.
+        grouping: compare the magnitudes of the correlations, regardless of sign.
     reference : str
         grouping: temperature that is subtracted from the others.
     max_sensors : int
         subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
     seconds : float
-        subsets: approximate time limit of the search for the best sets [s]; sets not proven best by then are reported.
+        subsets: approximate time limit of the search for the best sets [s]; the result names the sets that are not
+        proven best by then.
     criterion : str
         subsets: criterion by which the number of sensors is chosen.
     models : list of str
-        pareto: methods that are trained on the sensors.
+        pareto: methods fitted to each set of sensors.
     level : float
         ace: significance level of the Wilcoxon test.
     holm : bool
-        ace: correct the significance level for the number of tests.
+        ace: correct the significance level for the number of tests (Holm).
     """
 
     threshold: float = 0.9

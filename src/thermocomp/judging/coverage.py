@@ -123,16 +123,22 @@ def table(named: dict[str, Validity]) -> Table:
     """Return the covered conditions as a short table: one column per judging scheme."""
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
-    caption = f"Alike: inputs that differ by less than {ALIKE:g} of their spread throughout; copies count once."
+    caption = (
+        f"Cycles or files count as distinct if their inputs differ by at least {ALIKE:g} of the spread of the inputs; "
+        "copies count once."
+    )
     return Table(
-        title="Conditions covered by the judged units", columns=("", *named), rows=tuple(rows), caption=caption
+        title="Conditions covered by the judged cycles or files",
+        columns=("", *named),
+        rows=tuple(rows),
+        caption=caption,
     )
 
 
 def _cells(v: Validity) -> dict[str, str]:
     days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
     return {
-        "units judged": f"{v.units}, {v.independent} of them distinct" if v.units > 1 else f"{v.units}",
+        "cycles or files judged": f"{v.units}, {v.independent} of them distinct" if v.units > 1 else f"{v.units}",
         "two most similar": "" if v.nearest is None else f"differ by {v.nearest:.2f} of the inputs' spread",
         "hours, days": f"{v.hours:.1f} h{days}",
         "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
@@ -147,5 +153,5 @@ def _range(values: tuple[float, float]) -> str:
 
 def _listed(speeds: Sequence[float]) -> str:
     if len(speeds) > 12:
-        return f"{speeds[0]:.0f} to {speeds[-1]:.0f}, {len(speeds)} of them"
+        return f"{len(speeds)} speeds from {speeds[0]:.0f} to {speeds[-1]:.0f}"
     return ", ".join(f"{v:.0f}" for v in speeds)

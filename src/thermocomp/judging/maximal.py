@@ -69,8 +69,8 @@ def choose(samples: Samples, settings: Settings, *, jobs: int, progress: Progres
         method="ace",
         target=", ".join(targets),
         sensors=tuple(names[j] for j in chosen),
-        reason=f"greatest sum of Psi among the sets of up to {max(map(len, small))} sensors "
-        f"that are as good as the best for all displacements ({len(same.common)} sets are)",
+        reason=f"largest sum of Psi among the {len(same.common)} sets of up to {max(map(len, small))} sensors that are "
+        "as good as the best for all displacements",
         tables=(_best_sets(psi, same, names, targets), _listed_sets(psi, same, names, targets, chosen)),
         notes=tuple(notes),
         details=same,
@@ -88,7 +88,7 @@ def _best_sets(psi: MaximalCorrelations, same: Equivalents, names: Sequence[str]
     done = int(np.isfinite(psi.psi).all(axis=(0, 1)).sum())
     return Table(
         title="Best set for each displacement",
-        columns=("displacement", "best set", "mean Psi", "sets that are as good"),
+        columns=("displacement", "best set", "mean Psi", "equivalent sets"),
         rows=tuple(
             (
                 t,

@@ -69,10 +69,10 @@ def _notes(found: Budget, judging: Judging) -> list[str]:
     """Return the reason for the number of sensors, and the cases that could not be judged."""
     notes = [_rule(found)]
     if found.failures:
-        notes.append(f"Not judged with some numbers of sensors: {_failed(found)}")
+        notes.append(f"Some numbers of sensors could not be judged: {_failed(found)}")
     if len(found.blocks) < len(judging.splits):
         several = "one of the targets" if len(found.targets) > 1 else "the target"
-        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a number of {several} were left out.")
+        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a value of {several} were left out.")
     return notes
 
 
@@ -84,9 +84,9 @@ def _advice(found: Budget, model: str, place: int) -> list[str]:
     return [
         *([none_better] if idle else []),
         next_to_buy(found, model, place),
-        "In each set are the sensors from which the others can be predicted with the smallest change of the output of "
-        "`averaged`; the sets are the same for all displacements and models. The number of sensors was chosen by the "
-        "errors shown, so these are slightly optimistic.",
+        "Each set contains the sensors from which the others can be predicted with the smallest change of the output "
+        "of `averaged`; the sets are the same for all displacements and models. The number of sensors was chosen by "
+        "the errors shown, so these are slightly optimistic.",
     ]
 
 
@@ -114,12 +114,18 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
     headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
     return Table(
         title=f"Error on unseen blocks: {judging.name}",
-        columns=("sensors", *headings, f"next gains [{found.unit}]", "condition", "selected on all rows"),
+        columns=(
+            "sensors",
+            *headings,
+            f"gain of the next row [{found.unit}]",
+            "condition number",
+            "selected on all rows",
+        ),
         rows=rows,
         marked=place,
-        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; "
-        f"without compensation {found.none_mean():.2f} {found.unit}. Next gains: gain of {model} with the sensors of "
-        "the next row. Sufficient number, for each model: "
+        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; without compensation "
+        f"{found.none_mean():.2f} {found.unit}. Gain of the next row: reduction of the error of {model} by the "
+        "additional sensors of the next row. Sufficient number of sensors: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
         + ".",
     )
@@ -138,7 +144,7 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
         columns=("sensors", *(f"{t} mean RMS" for t in found.targets)),
         rows=rows,
         marked=1 + place,
-        caption="Each in its own unit; 0 sensors: without compensation."
+        caption="Each in the unit of the displacement; 0 sensors: without compensation."
         + (
             f" {found.targets[worst]} is affected most: {more[worst]:.2f} {found.unit} more than with all sensors."
             if place + 1 < len(errors)
@@ -153,14 +159,14 @@ def _next(found: Budget, model: str, place: int) -> Table:
     unit = found.unit
     return Table(
         title="Next sensor to buy",
-        columns=("sensors", "next", f"gains [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
+        columns=("sensors", "next", f"gain [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
         rows=tuple(
             (found.sizes[k], _joins(found, k), float(gains[k]), float(blocks[k].min()), float(blocks[k].max()))
             for k in range(len(gains))
         ),
         marked=place if place < len(gains) else None,
-        caption=f"With {model}; below zero the error is larger with the sensor than without it. "
-        "In each block the sensors are those that were selected without this block.",
+        caption=f"Gain: reduction of the error of {model}; if negative, the error is larger with the sensor than "
+        "without it. For each block, the sensors were selected with this block excluded.",
     )
 
 
@@ -210,7 +216,7 @@ def _frequency(found: Budget, place: int) -> Table:
             for j in order
             if found.frequency[place, j] > 0
         ),
-        caption="Selected again without each block: a sensor far below 100 % was selected by chance.",
+        caption="Selection repeated with each block excluded in turn: a sensor far below 100 % was selected by chance.",
     )
 
 
@@ -240,18 +246,18 @@ def _stand_ins(found: Budget, place: int) -> Table:
         title="Virtual sensors",
         columns=(
             "sensor",
-            "nearest other",
-            "its miss [degC]",
-            "from the selected",
-            "their miss [degC]",
+            "best other sensor",
+            "error with it [degC]",
+            "from the selected sensors",
+            "error with them [degC]",
             f"loss [{found.unit}]",
         ),
         rows=rows,
         caption="Each temperature is predicted from the single other one that predicts it best, and from the selected "
-        f"sensors (a selected one from the other selected ones, as if it failed), with {found.answer.noise:g} degC of "
-        "noise in use. Miss: RMS of the prediction error. Loss: change of the output of `averaged` with all "
-        f"temperatures if only this one is predicted from the selected sensors{_mean(found)}. Sensors with a share "
-        f"below {100 * PART:g} % are not named.",
+        "sensors (a selected one from the other selected ones, as if it had failed), with sensor noise of "
+        f"{found.answer.noise:g} degC in use. Error: RMS of the prediction error. Loss: change of the output of "
+        f"`averaged` with all temperatures if only this one is predicted from the selected sensors{_mean(found)}. "
+        f"Sensors with a share below {100 * PART:g} % are not named.",
     )
 
 

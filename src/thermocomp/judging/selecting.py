@@ -101,7 +101,7 @@ def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:
     taking = {features: k in found.participating_ for k, features in enumerate(found.groups_)}
     own = [next(i for i in g if i in found.representatives_) for g in found.groups_]
     groups = Table(
-        f"Groups of correlation above {settings.threshold:g}",
+        f"Groups with a correlation above {settings.threshold:g}",
         ("group", "sensors", "representative", "used"),
         tuple(
             (k, " ".join(candidates.called(g)), candidates.names[r], "yes" if taking[g] else "")
@@ -211,7 +211,7 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
     best = found.subsets_.best
     table = Table(
         title="Best subset of every size",
-        columns=("sensors", *(headings[k] for k in shown), "certificate", "which"),
+        columns=("sensors", *(headings[k] for k in shown), "certificate", "selected"),
         rows=tuple(
             (
                 len(s.columns),
@@ -240,8 +240,8 @@ def _by_subsets(candidates: Candidates, settings: Settings, *, jobs: int, progre
         method="subsets",
         target=candidates.target,
         sensors=sensors,
-        reason=f"best {len(sensors)} of {len(candidates.names)}, {'proven' if found.proven_ else 'not proven'}; "
-        f"the number by {what}",
+        reason=f"best {len(sensors)} of {len(candidates.names)} temperatures, "
+        f"{'proven' if found.proven_ else 'not proven'}; number of sensors by {what}",
         tables=(table, candidates.repeats(sensors)),
         notes=notes,
         details=found,

@@ -163,7 +163,7 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
             lines.append(f"(THE SAME GROUPS FROM {same.low:.6f} TO BELOW {same.high:.6f})")
         if self.left_out_:
             lines.append(f"LEFT OUT BECAUSE CONSTANT: {called(self.left_out_)}")
-        lines += ["", "GROUP  REPRESENTATIVE IN STEP  TAKES PART  MEMBERS, REPRESENTATIVE MARKED *"]
+        lines += ["", "GROUP  REPRESENTATIVE IN STEP  USED        MEMBERS, REPRESENTATIVE MARKED *"]
         for k, g in enumerate(self.groups_):
             (own,) = set(g) & set(self.representatives_)
             step = self.representatives_.index(own) + 1
@@ -173,7 +173,7 @@ class CorrelationGrouping(StaticRegressor, TermRegressor):
         lines += [f"{p:9d}  {s.mse:12.6g}  {called(s.columns)}" for p, s in enumerate(self.curve_, start=1)]
         lines += [
             "",
-            f"LOOKED AT: {self.searched_[0]} SUBSETS OF REPRESENTATIVES, {self.searched_[1]} COMBINATIONS OF MEMBERS",
+            f"EXAMINED: {self.searched_[0]} SUBSETS OF REPRESENTATIVES, {self.searched_[1]} COMBINATIONS OF MEMBERS",
             f"DEP VAR: {target}   N: {self.n_rows_}   SQUARED MULTIPLE R: {self.r_squared_:.4f}"
             f" ({self.r_squared_kind_.upper()})   STANDARD ERROR OF ESTIMATE: {self.standard_error_:.3f}",
             f"EFFECTIVE SAMPLE SIZE: {self.n_effective_:.1f}",

@@ -42,7 +42,7 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
             for s in self.log_
         ]
         if self.cycled_:
-            lines.append("STOPPED: THIS MODEL HAS BEEN THERE BEFORE")
+            lines.append("STOPPED: THIS MODEL HAS OCCURRED BEFORE")
         lines += ["", "THE SUBSET MODEL INCLUDES THE FOLLOWING PREDICTORS:", ""]
         lines.append(fill(", ".join(self.terms_) or "NONE", 100, break_long_words=False, break_on_hyphens=False))
         lines += [

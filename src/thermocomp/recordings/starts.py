@@ -17,7 +17,7 @@ from thermocomp.recordings.recording import Recording
 Word = Literal["cold", "continued", "rezeroed", "known"]
 #: description of each initial state, for tables and errors
 WORDS: dict[Word, str] = {
-    "cold": "zeroed at rest at its start",
+    "cold": "zeroed at its start, at rest",
     "continued": "continues from an earlier file, and uses the zero of that file",
     "rezeroed": "displacements and temperatures are relative to its start, on a machine that may be warm",
     "known": "uses a known zero",

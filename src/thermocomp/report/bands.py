@@ -22,9 +22,10 @@ def describe_bands(models: Sequence[ErrorModel], assessments: Sequence[Assessmen
 def describe_coverage(a: Assessment) -> str:
     """Return the fraction of the judged rows inside the band, and the width of the band there."""
     share = 0.0 if a.half_widths is None else float(np.isfinite(a.half_widths).mean())
-    some = f" that have one ({100 * share:.0f} %; there is none where the correction is held)" if share < 0.995 else ""
+    none = "there is none while the correction is held"
+    some = f" with a band ({100 * share:.0f} % of all; {none})" if share < 0.995 else ""
     seen = ", which were used for training" if a.caveat else ""
     return (
-        f"The band held {100 * a.coverage:.0f} % of the judged rows{some}{seen}, with a mean half-width of "
+        f"The band contains {100 * a.coverage:.0f} % of the judged rows{some}{seen}, with a mean half-width of "
         f"{a.half_width:.2f} um ({a.band})"
     )

@@ -49,12 +49,12 @@ def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
         ax = figure.subplots()
         ax.axhline(0, color="#aaa", lw=0.8)
         whole = sum(parts.values(), np.full(len(samples), model.intercept))
-        ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label="predicted: all together")
+        ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label="prediction: sum of all")
         for name, colour in zip(ranked[:MOST], COLOURS, strict=False):
             ax.plot(*thin_points(hours, parts[name]), color=colour, label=name)
         if rest := ranked[MOST:]:
             others = sum((parts[name] for name in rest), np.zeros(len(samples)))
-            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"the other {len(rest)}")
+            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"sum of {len(rest)} more")
         ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
         ax.set_xlabel("time [h]")
         ax.margins(x=0)
@@ -69,18 +69,20 @@ def _table(model: PacedDynamic, step: float) -> Layout:
     columns = (
         Column("input", "name"),
         Column(f"within {step:g} s", "instantaneous", "um"),
-        Column("settled", "settled", "um"),
-        Column("in", "per"),
-        Column("adds at most", "bound", "um", model.unit),
+        Column("steady state", "settled", "um"),
+        Column("unit", "per"),
+        Column("largest contribution", "bound", "um", model.unit),
     )
     return Layout(columns, rows)
 
 
 def _lags(model: PacedDynamic) -> str:
     lags = ", ".join(f"{tau / 60:g}" for tau in model.time_constants)
-    found = [f"Lags of the temperatures: {lags} min."] if lags else []
+    found = [f"Time constants of the temperature lags: {lags} min."] if lags else []
     if model.states:
         ends = [sorted({getattr(s, key) / 60 for s in model.states}) for key in ("stopped", "running")]
         rest, run = (f"{e[0]:g} to {e[-1]:g}" for e in ends)
-        found.append(f"States of the speed: {rest} min at rest, {run} min at {model.top_speed:.0f} 1/min.")
+        found.append(
+            f"Time constants of the spindle speed states: {rest} min at rest, {run} min at {model.top_speed:.0f} 1/min."
+        )
     return " ".join(found)

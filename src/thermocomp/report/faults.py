@@ -37,17 +37,17 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     if not logs:
         known = any(m.watch is not None for m in judged.models)
         why = (
-            "the recordings lack inputs that the watch needs"
+            "the recordings lack channels that the watch (fault detection) needs"
             if known
-            else "the model file contains no watch; fit the model again"
+            else "the model file contains no watch (fault detection); fit the model again"
         )
-        return Section(TITLE, [f"The temperatures were not watched: {why}."])
+        return Section(TITLE, [f"Temperature sensors were not monitored for faults: {why}."])
     if not any(log.faults for log in logs):
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
-        return Section(TITLE, [f"None of the {len(watched)} temperatures failed: {', '.join(watched)}."])
+        return Section(TITLE, [f"None of the {len(watched)} temperature sensors failed: {', '.join(watched)}."])
     parts: list[str | Layout | Shown] = [
-        "The recordings were replayed as the machine would have read them: a fault is known only once it is detected. "
-        "Rows in which check finds a fault afterwards are left out of the verdict above, but not here."
+        "The recordings were replayed as at the machine, where a fault takes effect until it is detected. Rows in "
+        "which thermocomp check finds a fault are excluded from the verdict above, but not from this section."
     ]
     for log in (log for log in logs if log.faults):
         recording = recordings[log.recording]
@@ -62,9 +62,9 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     if cautions:
         limits = judged.overall()[0].limits or Limits()
         parts.append(
-            "Held, then fades: without these sensors the model was never judged, or does harm. The correction stays "
-            f"for {limits.hold / 60:g} min, then goes to zero with a time constant of {limits.fade / 3600:g} h: the "
-            "results here and above include this."
+            "'Held, then fades': without these sensors the model was never judged, or does harm. Its correction is "
+            f"held for {limits.hold / 60:g} min, then decays to zero with a time constant of {limits.fade / 3600:g} h; "
+            "the results here and above include this."
         )
     return Section(TITLE, parts, cautions)
 
@@ -76,11 +76,13 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
             recording = recordings[log.recording]
             until = f"to {_when(f.end, recording)}" if f.returned else "to the end"
             beside = (
-                f"; it read {f.beside:+.1f} degC relative to its substitute value" if math.isfinite(f.beside) else ""
+                f"; its reading minus its substitute value was {f.beside:+.1f} degC on average"
+                if math.isfinite(f.beside)
+                else ""
             )
             yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
         if len(log.faults) > TOLD:
-            yield f"{log.name}: {len(log.faults) - TOLD} more failures, on the page that -o writes"
+            yield f"{log.name}: {len(log.faults) - TOLD} more failures are listed on the page that -o writes"
 
 
 def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
@@ -91,8 +93,8 @@ def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
 
 def _held_words(target: str, unit: str, cost: Cost) -> str:
     return (
-        f"{target}: while {', '.join(cost.failed)} failed, the correction is held, then fades at the machine: "
-        f"{cost.rms:.2f} {unit} RMS in {cost.hours:.1f} h."
+        f"{target}: while {', '.join(cost.failed)} had failed, the machine would hold the correction, then fade it: "
+        f"{cost.rms:.2f} {unit} RMS over {cost.hours:.1f} h."
     )
 
 
@@ -155,7 +157,7 @@ def draw_stand_ins(log: FaultLog) -> Drawn:
             for f in (f for f in log.faults if f.sensor == name):
                 ax.axvspan(f.begin / 3600, f.end / 3600, color=SHADE, lw=0, zorder=0)
             ax.plot(hours, log.read[step, k], color=MEASURED, lw=1.4, label="reading")
-            ax.plot(hours, log.stood_in[step, k], color=PREDICTED, ls="--", lw=1.6, label="what stood in")
+            ax.plot(hours, log.stood_in[step, k], color=PREDICTED, ls="--", lw=1.6, label="substitute value")
             ax.set_title(shorten(name, LONGEST), fontsize=8)
             ax.set_ylim(*_around(log.read[:, k], log.stood_in[:, k]))
             ax.set_xlim(float(log.time[0]) / 3600, float(log.time[-1]) / 3600)
@@ -180,10 +182,10 @@ def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
 def _timeline_words(log: FaultLog, logs: Sequence[FaultLog]) -> str:
     good = len(log.watch.names) - len(log.failed)
     others = [other.name for other in logs if not other.faults]
-    more = f" In {', '.join(others)} none failed." if others else ""
+    more = f" No sensor failed in {', '.join(others)}." if others else ""
     return (
-        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperatures failed, {good} did not; coloured while "
-        f"one was not trusted, from the time of detection.{more}"
+        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperature sensors failed, {good} did not. "
+        f"Coloured: from the detection of a failure until the sensor is trusted again.{more}"
     )
 
 
@@ -199,7 +201,7 @@ def _fault_table(log: FaultLog, recording: Recording) -> Layout:
     columns = (
         Column("sensor", lambda f: f.sensor),
         Column("fault", lambda f: f.word),
-        Column("found", lambda f: _when(f.begin, recording), ">"),
+        Column("detected", lambda f: _when(f.begin, recording), ">"),
         Column("until", lambda f: _when(f.end, recording) if f.returned else "the end", ">"),
         Column("reading minus substitute, mean", lambda f: f.beside, "um", "degC"),
     )
@@ -211,12 +213,12 @@ def _fault_table(log: FaultLog, recording: Recording) -> Layout:
 
 def _cost_table(title: str, unit: str, costs: Sequence[Cost]) -> Layout:
     columns = (
-        Column("sensors that had failed", lambda c: ", ".join(c.failed) or "none"),
+        Column("failed sensors", lambda c: ", ".join(c.failed) or "none"),
         Column("judged", lambda c: c.hours, ".1f", "h"),
         Column("RMS", lambda c: c.rms, "um", unit),
         Column("without compensation", lambda c: c.none_rms, "um", unit),
-        Column("honest error with these lost", lambda c: c.honest, "um", unit),
-        Column("at the machine", lambda c: "runs on" if c.runs_on else "held, then fades"),
+        Column("honest error without them", lambda c: c.honest, "um", unit),
+        Column("correction at the machine", lambda c: "continues" if c.runs_on else "held, then fades"),
     )
     return Layout(columns, costs, title=title)
 

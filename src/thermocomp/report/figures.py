@@ -52,7 +52,7 @@ def measured(recording: Recording) -> Drawn:
                     free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
             (rest[0], recording.temperatures, "degC", "temperatures"),
-            (rest[1], recording.displacements, "um", "displacements: error of a part"),
+            (rest[1], recording.displacements, "um", "displacements: error of an uncompensated part"),
         ):
             for k, c in enumerate(channels):
                 ax.plot(*thin_points(hours, recording.table[c.name].to_numpy()), **line_style(k), label=c.name)
@@ -91,7 +91,7 @@ def overview(comparison: Comparison) -> Drawn:
         add_legend(figure, loc="outside upper right", ncols=4)
         for ax in panels:
             log_ticks(ax, "x")
-        panels[-1].set_xlabel("RMS of the residual where it was judged [um], smaller is better")
+        panels[-1].set_xlabel("RMS of the residual on the judged rows [um]; smaller is better")
         return svg(figure)
 
 
@@ -179,7 +179,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
                     bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 0.8},
                 )
         noise = found[0].robustness.noise if found and found[0].robustness else 0.0
-        ax.plot([], [], "o", color=PREDICTED, label="clean")
+        ax.plot([], [], "o", color=PREDICTED, label="undisturbed")
         ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
         ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
         ax.plot([], [], "|", color=RESIDUAL, label="one sensor lost")
@@ -187,7 +187,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         log_ticks(ax, "x")
         name_ticks(ax.yaxis, [a.target for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
-        ax.set_xlabel(f"{model}: RMS of the residual where it was judged [um]")
+        ax.set_xlabel(f"{model}: RMS of the residual on the judged rows [um]")
         add_legend(ax, **BESIDE)
         return svg(figure)
 

@@ -22,22 +22,22 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
         if stood:
             worst = max(stood, key=lambda n: stood[n])
             said.append(
-                f"one lost temperature, replaced by its prediction, leaves at most {stood[worst]:.2f} {model.unit} "
-                f"({worst})"
+                f"at most {stood[worst]:.2f} {model.unit} with one temperature sensor lost and replaced by its "
+                f"prediction ({worst})"
             )
         if gone := [n for n in single if n not in stood]:
-            said.append(f"without {', '.join(gone)} its correction is held, then fades")
+            said.append(f"without {', '.join(gone)} the correction is held, then fades")
         heat = [n for n in single if n in watch.names]
         dear |= dict.fromkeys(n for n in heat if n not in stood or single[n] > DEAR * found.rms)
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
     if dear:
         yield (
-            f"A spare sensor is recommended for {', '.join(dear)}: without it a correction is held, or its error is "
-            f"over {DEAR:g} times as large"
+            f"A spare sensor is recommended for {', '.join(dear)}: without it a correction is held, or the error is "
+            f"more than {DEAR:g} times as large"
         )
     blind = [f"{n} ({s.off:.1f} degC)" for n, s in zip(watch.names, watch.sensors, strict=True) if s.off > FAR]
     if blind:
         yield (
-            f"Slow drift of {', '.join(blind)} is detected only beyond these values: the other temperatures and the "
-            "speed do not predict it better; a spare sensor would"
+            f"Slow drift of {', '.join(blind)} is detected only beyond these values, because the other temperatures "
+            "and the spindle speed do not predict these sensors more accurately; a spare sensor would help"
         )

@@ -41,11 +41,11 @@ def _draw_runs(ax: Axes, plan: Plan) -> None:
     recorded = [(v, length / 3600) for v, length, _ in plan.covered.runs]
     ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7, label="recorded")
     others = {(c.trial.speed, _longest(c.trial)) for c in plan.candidates if c.trial.kind != "room"}
-    ax.plot(*np.array(sorted(others)).T, "o", color=NONE, mfc="none", ms=4, lw=0, label="tests compared")
+    ax.plot(*np.array(sorted(others)).T, "o", color=NONE, mfc="none", ms=4, lw=0, label="candidate tests")
     best = plan.candidates[0].trial
     if best.kind != "room":
         ax.plot(best.speed, _longest(best), label="next test", **_STAR)
-    _finish(ax, plan, "runs", "run [h]", room=0.35)
+    _finish(ax, plan, "runs", "duration of the run [h]", room=0.35)
     add_legend(ax, loc="upper left", ncols=2, fontsize=7)
 
 
@@ -56,7 +56,7 @@ def _draw_stops(ax: Axes, plan: Plan) -> None:
     best = plan.candidates[0].trial
     if best.kind in ("repeated", "stop"):
         ax.plot(best.speed, best.steps[2][1] / 3600, **_STAR)
-    _finish(ax, plan, "stops after a run", "stop after it [h]")
+    _finish(ax, plan, "stops after a run", "duration of the stop [h]")
 
 
 def _draw_room(ax: Axes, plan: Plan) -> None:
@@ -64,7 +64,7 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
     rooms = plan.covered.rooms
     ax.bar(range(1, 1 + len(rooms)), rooms, color=MEASURED, width=0.6)
     if not rooms:
-        ax.text(0.5, 0.5, "no temperature of\nthe room was recorded", transform=ax.transAxes, ha="center", fontsize=8)
+        ax.text(0.5, 0.5, "no room temperature\nwas recorded", transform=ax.transAxes, ha="center", fontsize=8)
     if plan.swing:
         ax.axhline(plan.swing, color=NONE, ls="--", lw=0.8, label=f"assumed: {plan.swing:g} degC")
     if plan.candidates[0].trial.kind == "room":
@@ -74,8 +74,8 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
     ax.set_ylim(0, 1.35 * max(*rooms, plan.swing, 1.0))
     ax.set_axisbelow(True)
     ax.set_xlabel("recording")
-    ax.set_ylabel("change of the room [degC]")
-    ax.set_title("room")
+    ax.set_ylabel("change of the room temperature [degC]")
+    ax.set_title("room temperature")
     add_legend(ax, loc="upper right", fontsize=7)
 
 
@@ -86,7 +86,7 @@ def _draw_tests(ax: Axes, plan: Plan) -> None:
     ax.invert_yaxis()
     ax.set_axisbelow(True)
     ax.set_xlabel("expected reduction of the error [um]")
-    ax.set_title(f"next test (expected error now {plan.expected:.2f} um)")
+    ax.set_title(f"candidate tests (expected error now {plan.expected:.2f} um)")
 
 
 def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
@@ -94,7 +94,7 @@ def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
     levels = curve.by_cycles()
     ax.plot([p.learned for p in curve.points], [p.rms for p in curve.points], ".", color="#bbbbbb")
     learned, rms = [x.learned for x in levels], [x.rms for x in levels]
-    ax.plot(learned, rms, "o-", color=PREDICTED, label=f"{curve.model}, mean and its standard error")
+    ax.plot(learned, rms, "o-", color=PREDICTED, label=f"{curve.model}: mean and standard error")
     ax.errorbar(learned, rms, [x.error for x in levels], fmt="none", ecolor=PREDICTED, capsize=2)
     ax.axhline(curve.none, color="#999999", ls="--", lw=0.8, label="no compensation")
     ax.set_ylim(bottom=0)

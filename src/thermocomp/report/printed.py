@@ -47,7 +47,8 @@ def comparison(found: Comparison) -> Iterator[Item]:
     yield from (PrintedLine(f" {caution}", BUT) for caution in cautions(found))
     yield from map(PrintedLine, describe_running(found.overall()))
     if found.left:
-        yield PrintedLine(f" {found.left} pairs of method and target were not judged", Toned("stopped:", "grave"))
+        text = f" {found.left} combinations of method and target were not judged"
+        yield PrintedLine(text, Toned("stopped:", "grave"))
 
 
 def choices(found: Sequence[Choice]) -> Iterator[Item]:
@@ -110,7 +111,7 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
 
 def _disturbed(target: str, found: Robustness) -> Iterator[PrintedLine]:
     if found.harm:
-        yield PrintedLine(f" {target}: {found.harm}", Toned("harmful when disturbed", "bad"))
+        yield PrintedLine(f" {target}: {found.harm}", Toned("harmful with noise or a lost sensor", "bad"))
     if found.outside > 0.1:
         yield PrintedLine(f" {100 * found.outside:.0f} % of the rows are outside the trained range of {target}", BUT)
     if found.unlike > 0.1:
@@ -124,13 +125,13 @@ def _titled(title: str, t: Table) -> Iterator[Item]:
 
 
 def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[PrintedLine]:
-    return (PrintedLine(f"Start of {start.told(name)}") for name, start in begins)
+    return (PrintedLine(f"Initial state of {start.told(name)}") for name, start in begins)
 
 
 def _robustness(assessments: Sequence[Assessment]) -> Layout:
     columns = (
         Column("target", "target"),
-        Column("clean", "clean", ".2f"),
+        Column("undisturbed", "clean", ".2f"),
         Column("uniform noise", "uniform", ".2f"),
         Column("normal noise", "normal", ".2f"),
         Column("worst lost sensor", "lost", ">"),
@@ -148,7 +149,8 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
         if a.robustness is not None
     ]
     probed = any(a.probed is not None for a in assessments)
-    return Layout(columns, rows, f"Robustness of the models alone: RMS in um{', without probings' if probed else ''}")
+    without = "gate, limits and probings" if probed else "gate and limits"
+    return Layout(columns, rows, f"Robustness of the models alone, without {without}: RMS in um")
 
 
 def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
@@ -174,7 +176,7 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
     return Layout(
         columns,
         rows,
-        caption="residual in um where it was judged"
+        caption="residual in um on the judged rows; less: reduction of the RMS"
         + ("; in-sample: on the rows used for training" if any(a.caveat for a in assessments) else "")
         + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
@@ -185,7 +187,8 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
 def _band_words(assessments: Sequence[Assessment]) -> str:
     """Return the explanation of the band columns, if there is a band."""
     names = dict.fromkeys(name for a in assessments if a.overall and a.band for name in a.band.split("; "))
-    return f"; held, +-: rows within the band, its mean half-width ({'; '.join(names)})" if names else ""
+    listed = "; ".join(names)
+    return f"; held, +-: share of the rows inside the band, and its mean half-width ({listed})" if names else ""
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
@@ -206,7 +209,7 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
             if any(k in cells for k in keys):
                 rows.append((f"  {name}", *(cells.get(k, "") for k in keys)))
     columns = (Column(h, k, ">", whole=across is models) for k, h in enumerate(across, start=1))
-    caption = "RMS in um in each cycle, or the part of it, that was judged; ! = harmful"
+    caption = "RMS in um in each judged cycle, or in the judged part of it; ! = harmful"
     return Layout((Column("", 0, whole=True), *columns), rows, caption=caption, sections=frozenset(sections))
 
 

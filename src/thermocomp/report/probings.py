@@ -20,13 +20,13 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
         if (probed := a.probed) is None:
             continue
         if (after := a.metric("max_abs")) > (before := a.unprobed_metric("max_abs")):
-            yield f"{a.target}: its largest error increases with the probings, from {before:.2f} to {after:.2f} um"
-        held = " by the probings alone, each held until the next"
+            yield f"{a.target}: the probings increase the largest error, from {before:.2f} to {after:.2f} um"
+        held = " with probings but no model, each correction held until the next probing"
         ways = {"": a.metric, " without": a.unprobed_metric, held: a.held_metric}
         left = "; ".join(f"{find('rms'):.2f} and {find('mae'):.2f}{words}" for words, find in ways.items())
-        yield f"{a.target}, {probed.plan.words} ({int(probed.at.sum())} in all): RMS and mean in um {left}"
+        yield f"{a.target}, {probed.plan.words} ({int(probed.at.sum())} in all): RMS and MAE in um: {left}"
         if probed.refused:
-            yield f"{a.target}: {len(probed.refused)} of them refused; the first: {probed.refused[0]}"
+            yield f"{a.target}: {len(probed.refused)} of the probings were refused; the first: {probed.refused[0]}"
 
 
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
@@ -35,7 +35,8 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
     if not probed:
         return None
     shown = Shown(
-        draw_shifts(probed, recordings), "Error of the model at each probing, and the shift added from then on."
+        draw_shifts(probed, recordings),
+        "Error of the model at each probing, and the shift added to the model from then on.",
     )
     return Section("Probings", [shown, *describe_probings(probed)])
 
@@ -54,7 +55,14 @@ def draw_shifts(probed: Sequence[Assessment], recordings: Sequence[Recording]) -
             ax.plot(
                 hours[rows], wrong[rows], color=MEASURED, lw=0.9, label="measured minus predicted, without probings"
             )
-            ax.step(hours[rows], a.probed.shift[rows], color=PREDICTED, lw=1.4, where="post", label="added")
+            ax.step(
+                hours[rows],
+                a.probed.shift[rows],
+                color=PREDICTED,
+                lw=1.4,
+                where="post",
+                label="shift added to the model",
+            )
             ax.plot(hours[a.probed.at], wrong[a.probed.at], "o", ms=5, color="#222", mfc="white", label="probing")
             ax.set_ylabel(f"{shorten(a.target.removesuffix('_um'), LONGEST)} [um]")
             low, high = np.quantile(wrong, [0.001, 0.999])

@@ -17,16 +17,16 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
         off = [(a, a.metric("rms"), a.alone_metric("rms")) for a in limited]
         other = sorted((x for x in off if f"{x[1]:.2f}" != f"{x[2]:.2f}"), key=lambda x: -abs(x[2] - x[1]))
         shown = [f"{a.model} for {a.target} {alone:.2f} instead of {ran:.2f} um" for a, ran, alone in other[:MOST]]
-        more = f", {len(other) - MOST} more by less" if len(other) > MOST else ""
+        more = f", and smaller differences for {len(other) - MOST} more" if len(other) > MOST else ""
         alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
         lines.append(
-            "The judged corrections are those that would run, behind the gate and with limits "
-            f"({limited[0].limits.in_words()}). RMS of the models alone: {alone_words}."
+            "The judged corrections are those that the machine would apply, with the gate (check of each reading) and "
+            f"the limits ({limited[0].limits.in_words()}). RMS of the models alone: {alone_words}."
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
-        lines.append(f"No limits for {', '.join(without)}: limits apply to micrometres only.")
+        lines.append(f"No limits for {', '.join(without)}: limits apply only to corrections in um.")
     lines += [
-        f"The gate rejected {a.rejected} of {len(a.measured)} readings of {a.model} for {a.target}; the first: "
+        f"The gate rejected {a.rejected} of {len(a.measured)} readings for {a.model}, {a.target}; the first: "
         f"{a.turned_away}."
         for a in judged
         if a.rejected

@@ -20,7 +20,7 @@ TITLE = 80
 TOLD = {
     "RMS on left-out cycles [um]": "Best set of each number of sensors: residual on left-out thermal cycles.",
     "MSE_p [um^2]": "Best set of each number of sensors: residual mean square.",
-    "R2": "Steps from top to bottom: unexplained share of the variance of the error after each step.",
+    "R2": "Steps of the selection, from top to bottom: unexplained share of the variance of the error after each step.",
     "mean Psi": "Sets of sensors: difference between 1 and their maximal correlation with the error.",
 }
 
@@ -30,13 +30,14 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     found = choice.details
     if isinstance(found, Budget):
         return budget(found), (
-            "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: sufficient, the "
-            "gain of more sensors is within the margin of the rule. Condition: collinearity of the sensors."
+            "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: sufficient "
+            "number, the gain of more sensors is within the margin of the rule. Condition number: collinearity of the "
+            "sensors."
         )
     if choice.method == "grouping" and found is not None:
         return grouping(found, choice.target), (
-            "Left: correlation of each pair of temperatures, with the groups in sequence and framed; names of "
-            "representatives are bold. Right: the best subset of each number of representatives."
+            "Left: correlation of each pair of temperatures; the groups follow each other and are framed, and the "
+            "names of the representatives are bold. Right: the best subset of each number of representatives."
         )
     # Wessel's ranked sets follow the best set for each displacement
     for table in reversed(choice.tables):
@@ -129,10 +130,10 @@ def budget(b: Budget) -> Drawn:
         errors.axhline(b.none_mean(), color=NONE, lw=2.5, label="no compensation")
         everything, colour = b.mean()[shown, -1], COLOURS[shown % len(COLOURS)]
         errors.axhline(everything, color=colour, ls=":", label=f"{b.models[shown]}, all {names[-1]} temperatures")
-        errors.plot([], [], ".", color="#888", label=f"one unseen block{mean}")
+        errors.plot([], [], ".", color="#888", label=f"a single unseen block{mean}")
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="sufficient: more is not clearly better")
         log_ticks(errors, "y")
-        errors.set_ylabel(f"RMS unseen [{b.unit}]")
+        errors.set_ylabel(f"RMS on unseen data [{b.unit}]")
         names_of = ", ".join(b.targets)
         title = names_of if len(names_of) <= TITLE or len(b.targets) == 1 else f"{len(b.targets)} displacements"
         title = f"{shorten(title, TITLE)}: error against the number of temperature sensors"
@@ -141,7 +142,7 @@ def budget(b: Budget) -> Drawn:
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
         log_ticks(repeats, "y", dense=0.35)
-        repeats.set_ylabel("condition")
+        repeats.set_ylabel("condition number")
         chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
         name_ticks(chosen.yaxis, b.candidates, fontsize=7)
         chosen.grid(visible=False)

@@ -64,7 +64,8 @@ def verdict(comparison: Comparison) -> str:
     left = [t for t in targets if t not in usable]
     if not usable:
         untried = any(do_no_harm.UNTRIED in a.verdict.caps for a in comparison.overall())
-        why = do_no_harm.UNTRIED if untried else "none was shown to be better than constants on unseen cycles"
+        shown = "none was shown to be better than a constant correction on unseen cycles"
+        why = do_no_harm.UNTRIED if untried else shown
         return f"No model may run yet for {_list(targets)}: {why}."
     by_model: dict[str, list[str]] = {}
     for t, a in usable.items():
@@ -83,12 +84,14 @@ def cautions(comparison: Comparison) -> list[str]:
     known = [(a, a.robustness) for a in best if a.robustness is not None]
     found = []
     if comparison.left:
-        found.append(f"the work was stopped: {comparison.left} pairs of method and target were not judged.")
+        found.append(
+            f"the comparison was stopped: {comparison.left} combinations of method and target were not judged."
+        )
     loud = [(a, max(mean for mean, _ in r.noise_rms.values())) for a, r in known]
     loud = [(a, noisy) for a, noisy in loud if 2 * a.metric("rms") < noisy <= a.none_metric("rms")]
     if loud:
-        text = _list([f"{a.target} {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
-        found.append(f"noise of {known[0][1].noise:g} degC on every temperature raises the RMS [um] of {text}.")
+        text = _list([f"{a.target} from {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
+        found.append(f"noise of {known[0][1].noise:g} degC on every temperature raises the RMS [um]: {text}.")
     found += harms(comparison)
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
@@ -118,8 +121,8 @@ def harms(comparison: Comparison) -> list[str]:
 def describe_unlike(r: Robustness) -> str:
     """Return the fraction of rows outside the joint support and the error there, as text."""
     return (
-        f"{100 * r.unlike:.0f} % of the rows are unlike the training data (inputs together, or a speed between trained "
-        f"ones), {r.unlike_rms:.2f} um RMS there"
+        f"{100 * r.unlike:.0f} % of the rows are unlike the training data (in the combination of inputs, or by a speed "
+        f"between trained speeds); the RMS there is {r.unlike_rms:.2f} um"
     )
 
 

@@ -89,7 +89,7 @@ def laser(axis: str, position: float) -> VirtualProbe:
 
 def pitch(position: int) -> VirtualProbe:
     """Return a laser that measures the pitch of Y at one of its stations [mm]."""
-    words = f"pitch of Y at {position} mm: turn of the headstock about X, laser"
+    words = f"pitch of Y at {position} mm: rotation of the headstock about X, laser"
     return VirtualProbe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
 
 
@@ -231,7 +231,7 @@ NEST = {
     "x2": VirtualProbe("X towards the spindle", {"x": 1.0, "b": PROBE_DISTANCE}),
     "y1": VirtualProbe("Y at the tip of the test bar", {"y": 1.0}),
     "y2": VirtualProbe("Y towards the spindle", {"y": 1.0, "a": -PROBE_DISTANCE}),
-    "z": VirtualProbe("Z at the tip of the test bar; negative: the tool nears the workpiece", {"z": 1.0}),
+    "z": VirtualProbe("Z at the tip of the test bar; negative: the tool approaches the workpiece", {"z": 1.0}),
 }
 #: measured relative to the spindle housing: in a calculation, or on the spindle itself
 SPINDLE = {

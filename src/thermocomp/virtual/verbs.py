@@ -27,10 +27,10 @@ def simulate(
         random, stepwise2017, stepwise2017-online, volumetric, volumetric-new, wessel-fem, wessel-milling, wessel-sets,
         wessel-tool.
     physics : {'linear', 'nonlinear'}, optional
-        Physics of the machine: joints, bearings and films with constant conductances (linear), or depending on
+        Physics of the machine: joints, bearings and convection with constant conductances (linear), or depending on
         temperature and speed (nonlinear). Default: as defined by the experiment.
     seed : int
-        Random seed of weather, noise and random draws.
+        Random seed of the weather, the noise and all other random draws.
     noise : float, optional
         Standard deviation of the temperature noise [degC]. Default: that of the sensor.
     progress : callable

@@ -20,9 +20,9 @@ class PositionSettings:
     Parameters
     ----------
     columns : str
-        Column names of one component, with * for the position in mm, such as 'y_laser_*'; in a long table the column of
-        the error. Default: columns named after the component, such as EYY_250_um, else those that end in a position and
-        the unit, such as y_laser_250_um.
+        Column names of one component, with * for the position in mm, such as 'y_laser_*'; in a long table, the name of
+        the column with the error. Default: columns named after the component, such as EYY_250_um, otherwise those whose
+        names end in a position and the unit, such as y_laser_250_um.
     positions : Path
         TOML file with the measuring position of each column, for columns without a position in their name.
     layout : str
@@ -31,11 +31,12 @@ class PositionSettings:
     mapping : Path
         TOML mapping file: role and unit of each column.
     model : str
-        Method for the slopes: any of ``thermocomp compare`` except gp.
+        Method for the slopes: any method of ``thermocomp compare`` except gp.
     inputs : list of str
         Channels used as inputs for the slopes. Default: all temperatures and the spindle speed.
     slopes : int
-        Highest power of the position; 0: the cold profile only. Default: as many powers as are useful.
+        Highest power of the position in the thermal part; 0: the cold profile only. Default: as many powers as are
+        useful.
     offset : bool
         Also model a shift of the whole profile. Default: only where the shift exceeds the noise.
     profile : str
@@ -46,7 +47,7 @@ class PositionSettings:
         States of each test that count as cold, as indices from 0; their mean is the cold profile. Default: the first
         state.
     reference_position : float
-        Reference position of the slopes [mm]. Default: where the thermal part is smallest.
+        Reference position of the slopes [mm]. Default: the position where the thermal part is smallest.
     split : str
         Chronological train/test split: fractions of the states such as 0.6/0.4, or durations such as 10h/6h.
     leave_one_cycle_out : bool

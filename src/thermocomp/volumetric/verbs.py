@@ -92,7 +92,7 @@ def position(
 ) -> Positioned:
     """Fit position-dependent errors: cold profiles and thermal slopes, judged on unseen data.
 
-    Settings that are not given are determined from the profiles, and again for each part of the data left out: the
+    Settings that are not given are determined from the profiles, and again in each fold without the left-out data: the
     useful number of slopes, whether the profile shifts as a whole, and the position about which it tilts.
 
     Parameters
@@ -236,9 +236,10 @@ def volumetric(
         TOML mapping file: role and unit of each column of the recording.
     at : tuple of float, optional
         Axis positions X Y Z of the point [mm] at which error, tilt and contributions are computed. The straight lines
-        pass through this point.
+        by which a controller corrects pass through this point.
     grid : int, optional
-        Number of points along each axis for the errors in the volume before and after correction.
+        Number of grid points along each axis at which the errors in the volume are computed, before and after
+        correction.
     tool_length : float, optional
         Tool length from the gauge point to the tip, along -Z [mm]. Default: the tool of the machine file.
     time : sequence of float, optional

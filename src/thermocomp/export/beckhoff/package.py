@@ -20,8 +20,8 @@ TAKEN = {
 _PAGE = """
 ## Into the CNC
 
-ds(T, s) = offset(T) + coefficient(T) (s - s0). The block `{name}_axis` makes these of `correction` and `slope`
-of `{name}`:
+ds(T, s) = offset(T) + coefficient(T) (s - s0). The block `{name}_axis` computes these values from `correction` and
+`slope` of `{name}`:
 
 | output | axis parameter | unit |
 |---|---|---|
@@ -30,19 +30,20 @@ of `{name}`:
 | `offset_value[k]` | P-AXIS-00273: offset | 0.1 um |
 | `coefficient[k]` | P-AXIS-00274: coefficient | um/m |
 
-| k | axis | of |
+| k | axis | target |
 |---|---|---|
 {rows}
 
-The PLC writes them over ADS, in a cycle of seconds (`ADSWRITE` of the library Tc2_System). **UNCONFIRMED**: index group
-and offset of these parameters in your version (look them up in the documentation of the CNC), and `direction`, whether
-the CNC adds the value to the command (1) or takes it off (-1). Try it, the spindle standing and an indicator on the
-axis: with P-AXIS-00273 at 200 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the CNC takes it off.
+The PLC writes them over ADS every few seconds (`ADSWRITE` of the library Tc2_System). **UNCONFIRMED**: index group
+and offset of these parameters in your version (see the documentation of the CNC), and `direction`, that is whether the
+CNC adds the value to the command (1) or subtracts it (-1). Test this with the spindle stopped and a dial indicator on
+the axis: with P-AXIS-00273 at 200 and all other values at 0, the axis moves by +0.02 mm, or by -0.02 mm if the CNC
+subtracts the value.
 
-At power-on the block begins with corrections of 0: write the parameters as 0 before the axes are homed, if the CNC
-keeps them.
+At power-on the block starts with corrections of 0: if the CNC retains the parameters, write 0 to them before the axes
+are homed.
 
-The CNC spreads a change over a number of cycles of its own; here a correction changes by at most {rate:g} um/s.
+The CNC distributes a change over several of its cycles; here a correction changes by at most {rate:g} um/s.
 """
 
 

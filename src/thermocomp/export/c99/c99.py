@@ -24,16 +24,16 @@ typedef double tc_real;
 extern "C" {{
 #endif
 
-/* readings that the zero is averaged of, at most; fewer take less memory, and then it is known earlier */
+/* maximum number of readings averaged for the zero (reference); fewer use less memory, and the zero is known earlier */
 #ifndef TC_ZERO_READINGS
 #define TC_ZERO_READINGS {most}
 #endif
 
 #if TC_ZERO_READINGS < 2
-#error "TC_ZERO_READINGS: at least 2"
+#error "TC_ZERO_READINGS must be at least 2"
 #endif
 
-/* what is compiled with other switches does not link */
+/* files compiled with different switches do not link */
 #define TC_PASTE(name, readings) name##readings
 #define TC_NAMED(name, readings) TC_PASTE(name, readings)
 #ifdef TC_FLOAT
@@ -44,27 +44,27 @@ extern "C" {{
 #define {name}_step TC_NAMED({name}_step_double_, TC_ZERO_READINGS)
 #endif
 
-/* what it takes, in this order */
+/* inputs, in this order */
 enum {{
 {inputs}
 }};
 
-/* what it corrects, in this order */
+/* targets of the corrections, in this order */
 enum {{
 {outputs}
 }};
 
-/* what is kept between two calls: read it, change nothing */
+/* state between two calls: read only */
 typedef struct {{
 {state}}} {name}_state;
 
-/* Begin: all corrections are zero. */
+/* Start: all corrections are zero. */
 void {name}_start({name}_state *s);
 
 /*
- * Take values in, measured `age` seconds ago, and move the corrections; `dt` is the time since the call before [s].
- * A value that is missing is given as NAN. Call it at every cycle: with values that are not new it waits, holds and
- * at last lets the corrections go to zero.
+ * Read values, measured `age` seconds ago, and update the corrections; `dt` is the time since the previous call [s].
+ * Give a missing value as NAN. Call it in every cycle: without new values it waits, then holds the corrections, and
+ * finally lets them decay to zero.
  */
 void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt);
 
@@ -86,11 +86,11 @@ _SOURCE = """{facts}#include "{name}.h"
 #include <math.h>
 
 #ifdef __FAST_MATH__
-#error "a value that is not a number would not be noticed: compile without -ffast-math"
+#error "NaN would not be detected: compile without -ffast-math"
 #endif
 
 #define TC(x) ((tc_real)(x))
-/* TC_ROUNDED: a number, and the next one of single precision that keeps to its bounds */
+/* TC_ROUNDED: a number, and the nearest single-precision number within its bounds */
 #ifdef TC_FLOAT
 #define TC_MATH(name) name##f
 #define TC_ROUNDED(x, single) TC(single)
@@ -99,7 +99,7 @@ _SOURCE = """{facts}#include "{name}.h"
 #define TC_ROUNDED(x, single) TC(x)
 #endif
 
-/* what is worked out again in every call */
+/* intermediate results, computed again in every call */
 typedef struct {{
 {work}}} {name}_work;
 

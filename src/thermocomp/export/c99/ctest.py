@@ -6,21 +6,21 @@ from collections.abc import Iterable
 from thermocomp.export.vectors import Answers, Readings
 from thermocomp.runtime.program.tables import Tables
 
-_PROGRAM = """/* runs {name}.c over its test vectors: {name}.md says how */
+_PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 #include "{name}.h"
 
 #include <math.h>
 #include <stdio.h>
 
 #ifdef TC_FLOAT
-#define TOLERANCE {single:.0e} /* what rounding of numbers changes, ten times, or 1e-5 */
+#define TOLERANCE {single:.0e} /* ten times the effect of rounding, at least 1e-5 */
 #else
-#define TOLERANCE {double:.0e} /* a model that feeds itself makes more of rounding */
+#define TOLERANCE {double:.0e} /* larger for a model with feedback, which amplifies rounding errors */
 #endif
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
 
-/* values, their age [s], time since the call before [s] */
+/* values, their age [s], time since the previous call [s] */
 static const double given[CALLS][INPUTS + 2] = {{
 {given}
 }};

@@ -22,22 +22,22 @@ _README = """{facts}
 
 # {name}: thermal compensation in C99
 
-`{name}.h` and `{name}.c` need nothing but `math.h`: no allocation, no globals. `{name}_test.c` runs them over {calls}
-calls, faults among them, and compares with what thermocomp says.
+`{name}.h` and `{name}.c` need only `math.h`: no memory allocation, no global variables. `{name}_test.c` calls them
+{calls} times, with sensor faults among the inputs, and compares the results with those of thermocomp.
 
-## Prove it
+## Verify it
 
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
-It prints how many calls are wrong (none), the largest difference, and how many bytes the state takes; its exit code is
-0 if all is well. {single}; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
-may be known earlier then, and the test does not fit). Compile all files of your program with the same of these:
-otherwise it does not link. Never compile with `-ffast-math`.
+It prints the number of wrong calls (expected: 0), the largest difference, and the size of the state in bytes; its exit
+code is 0 if all results agree. {single}. To save memory, add `-DTC_ZERO_READINGS=60` (at least 2): the zero (reference
+temperatures) is then averaged over fewer readings, may be known earlier, and the test no longer applies. Compile all
+files of your program with the same switches, otherwise they do not link. Never compile with `-ffast-math`.
 
 ## Run it
 
-Call it in a cycle, every ten seconds, with the time since the call before, measured or fixed. (At a shorter cycle the
-one call in which the zero becomes known has more to sort: 300 s / cycle readings of each input.)
+Call it cyclically, every ten seconds, with the time since the previous call, measured or fixed. (With a shorter cycle,
+the single call that computes the zero takes longer: it sorts 300 s / cycle time readings of each input.)
 
     #include "{name}.h"
     #include <math.h>                          /* NAN */
@@ -47,30 +47,30 @@ one call in which the zero becomes known has more to sort: 300 s / cycle reading
 
     {name}_start(&state);                      /* once */
     for (;;) {{                                 /* every dt seconds */
-        /* fill value[] as below; NAN for a sensor that says nothing */
+        /* fill value[] as below; NAN for a sensor without a reading */
         {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
-        /* give state.correction[0] to the controller [um] */
+        /* send state.correction[0] to the controller [um] */
     }}
 
-| value | what it is | unit |
+| value | meaning | unit |
 |---|---|---|
 {values}
 
-| correction | of | {line} |
+| correction | target | {line} |
 |---|---|---|
 {corrections}
 
 {geometry}{zero} {status}{sensors}
 
-## Try the sign
+## Test the sign
 
 {sign}
 
 ## Switch it off
 
-Do not set the correction to zero at once: the axis would jump. Call `{name}_step` with an age of 1e9: it stays where
-it is for {hold:g} s and then goes to zero, slowly. To begin again: `{name}_start`, once the correction is zero. The
-controller must not compensate for temperature itself at the same time.
+Do not set the correction to zero in one step: the axis would jump. Instead, call `{name}_step` with an age of 1e9: the
+correction is held for {hold:g} s and then decays slowly to zero. To restart, call `{name}_start` once the correction is
+zero. Do not use the controller's own temperature compensation at the same time.
 """
 
 

@@ -25,7 +25,7 @@ class CorrectionOptions(CompensatorOptions):
     Parameters
     ----------
     hold : float
-        Hold time of a correction without valid readings [s].
+        Time for which a correction is held without valid readings [s].
     fade : float
         Time constant of the decay of the correction to zero after the hold time [s].
     reading_age : float

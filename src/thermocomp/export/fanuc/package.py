@@ -20,10 +20,10 @@ SIGN = (
 UNITS = "Units: offsets in mm, temperatures in degC"
 #: unconfirmed assumptions, stated at the top and repeated in the code
 UNCONFIRMED = (
-    "UNCONFIRMED: no line of this was tried on a Fanuc control, nor confirmed by its manuals here",
+    "UNCONFIRMED: no line of this was tested on a Fanuc control or checked against its manuals",
     "UNCONFIRMED: #5201, #5202, #5203 as external workpiece zero offset of X, Y, Z in mm, which a program may write",
-    "UNCONFIRMED: how the PMC brings temperatures in degC into #501 and on; these numbers stand for yours",
-    "UNCONFIRMED: that IF...THEN is known to your control, and that it waits for a new offset before the next move",
+    "UNCONFIRMED: how the PMC writes temperatures in degC to #501 and following; replace these numbers by yours",
+    "UNCONFIRMED: that your control supports IF...THEN, and applies a new offset before the next move",
 )
 _OFFSETS = {"X": 5201, "Y": 5202, "Z": 5203}
 #: common variables, retained at power-off: enable, first temperature, corrections in force
@@ -34,42 +34,43 @@ _ROOM = _FORCE["X"] - _FIRST
 INTERVAL = 60.0
 
 _ABOUT = """\
-The macro works out the formula of the temperatures in common variables and moves the external workpiece zero offset
-towards it: within {most:g} um of zero and by at most {step:g} um a call, which is {rate:g} um/s at a call every
-{interval:g} s. If a temperature is vacant or beyond what is plausible, the axis keeps the correction that it has.
+The macro evaluates a formula of the temperatures in common variables and moves the external workpiece zero offset
+towards the result: the correction is limited to {most:g} um, and its change to {step:g} um per call, that is {rate:g}
+um/s with a call every {interval:g} s. If a temperature is vacant or implausible, the axis keeps its present correction.
 
-What counts as zero is fixed: the temperatures in the macro, where the recording began. Set datums with the
-correction in force: they take in what it says then, and only changes count from there on. Nothing else may write
-that offset while it runs; what stands in it before is kept, for the macro adds."""
+The zero (reference temperatures) is fixed: the temperatures written in the macro, those at the start of the recording.
+Set datums with the correction in force: they then include its present value, and only later changes have an effect.
+Nothing else may write to that offset while the macro is in use; a value that was there before is kept, because the
+macro adds to it."""
 
 _INSTALL = """\
-All of this is **UNCONFIRMED** on a control: have the machine builder look at it.
+All of this is **UNCONFIRMED** on a control: have the machine builder check it.
 
-1. Choose free common variables that are kept at power-off in place of #500 to #{last} and, in the macro, put
-   theirs.
-2. Have the PMC write the temperatures in degC: {sensors}. It must write vacant, or leave the value alone, if a
-   sensor fails; a zero within the plausible range is believed.
-3. Load `{name}.nc` under a free number in place of O7701; programs from O8000 on are usually protected.
-4. Call it (`G65 P7701`, which gives it local variables of its own) where the axes are clear and no cutter
-   compensation is active, such as at every start of a part: at least every {interval:g} s for it to keep up, and
-   never more often for the rate to hold.
-5. Try the sign in two minutes with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and go to the
-   same position again: the tool has to stand 0.1 mm further in its plus direction. Take it away again.
-6. `#500 = 1` switches it on. Set the datums again once it has arrived.
+1. Choose free common variables that are retained at power-off, and replace #500 to #{last} in the macro by them.
+2. Have the PMC write the temperatures in degC: {sensors}. If a sensor fails, it must write vacant or leave the
+   value unchanged; a value of 0 within the plausible range is taken as a temperature.
+3. Load `{name}.nc` under a free program number instead of O7701; programs from O8000 on are usually protected.
+4. Call it (`G65 P7701`, so that it has its own local variables) every {interval:g} s, at points where the axes are
+   clear and no cutter compensation is active, such as the start of each part. With less frequent calls the
+   correction lags; with more frequent calls it changes faster than the rate above.
+5. Test the sign, which takes two minutes, with #500 = 0: add 0.1 mm to the external offset of an axis by hand, and
+   move to the same position again: the tool must be 0.1 mm further in the plus direction. Restore the offset.
+6. `#500 = 1` switches the correction on. Set the datums again once it has reached its value.
 
 """
 
 _CHECK = """\
-`{name}_vectors.csv` holds temperatures [degC], the deviation that the formula says ("growth") [mm], the correction
-that the offset has to arrive at [um], and its tolerance: the control rounds to 1 um. Rows beyond the trained range
-and the limit are among them, and some with a temperature that is not plausible: there nothing may move. `python3
-{name}_check.py` (Python alone) runs the macro's own lines until nothing moves, and compares: exit code 0 if all
-agree. On the control: put a row's temperatures into the variables by MDI, #500 = 1, call the macro until nothing
-moves, and read the external offset. Then back to the true ones."""
+`{name}_vectors.csv` contains temperatures [degC], the deviation by the formula ("growth") [mm], the correction that
+the offset must reach [um], and its tolerance (the control rounds to 1 um). It includes rows beyond the trained range
+and the limit, and rows with an implausible temperature, where the correction must not change. `python3
+{name}_check.py` (needs only Python) runs the lines of the macro until the correction no longer changes, and compares:
+exit code 0 if all rows agree. On the control: write the temperatures of a row to the variables by MDI, set #500 = 1,
+call the macro until the correction no longer changes, and read the external offset. Then restore the variables."""
 
 _OFF = """\
-`#500 = 0`, and continue calling the macro: it takes its correction back by at most {step:g} um a call. When {forces}
-are 0 it has gone, and the calls may go, too. Never clear the external offset by hand while the macro is called."""
+Set `#500 = 0` and continue to call the macro: it removes its correction by at most {step:g} um per call. When {forces}
+are 0, it is removed, and the calls can be removed too. Never clear the external offset by hand while the macro is in
+use."""
 
 
 def write_fanuc(
@@ -84,7 +85,7 @@ def write_fanuc(
     first = [*head(reductions, facts, SIGN, UNITS), *UNCONFIRMED]
     told = [f"({line})" for line in map(_comment, first)]
     lines = ["%", f"O7701 {told[0]}", *told[1:]]
-    lines += [f"(#{_ON}: 1 IS ON. ANYTHING ELSE TAKES THE CORRECTION BACK)"]
+    lines += [f"(#{_ON}: 1 IS ON. ANY OTHER VALUE REMOVES THE CORRECTION)"]
     lines += [f"(#{place[s]}: {m.upper()} IN DEGC. UNCONFIRMED: FROM THE PMC)" for s, m in marks.items()]
     for r in reductions:
         lines += _axis(r, place, most, step)
@@ -94,10 +95,10 @@ def write_fanuc(
         reductions,
         what="a custom macro of a Fanuc control",
         about=_ABOUT.format(most=most, step=step, rate=limits.rate, interval=INTERVAL),
-        limits=f"at most {most:g} um and {step:g} um a call are in the macro; the errors above are those "
-        "of the formula alone.",
-        failed="one that is vacant or not plausible stops its axes where they are; a wrong one within the "
-        "plausible range moves them.",
+        limits=f"the macro limits the correction to {most:g} um and its change to {step:g} um per call; the errors "
+        "above are those of the formula without these limits.",
+        failed="if a temperature is vacant or implausible, its axes keep their correction; a wrong value within the "
+        "plausible range is not detected and moves them.",
         install=_INSTALL.format(
             name=name,
             last=_FORCE["Z"],
@@ -121,16 +122,16 @@ def _axis(r: Reduced, place: dict[str, int], most: float, step: float) -> Iterat
     """Yield the lines of the macro that correct one axis."""
     force, label = _FORCE[r.axis], 10 * (1 + "XYZ".index(r.axis))
     yield f"({_comment(r.model.target)})"
-    yield f"(#{force}: CORRECTION OF {r.axis} IN FORCE IN MM. KEPT AT POWER-OFF)"
+    yield f"(#{force}: CORRECTION OF {r.axis} IN FORCE IN MM. RETAINED AT POWER-OFF)"
     yield f"IF[#{force}NE#0]GOTO{label + 1}"
     yield f"#{force}=0.0"
     yield f"N{label + 1}#1=0.0"
-    yield f"IF[#{_ON}NE1]GOTO{label + 2} (OFF: TAKEN BACK)"
+    yield f"IF[#{_ON}NE1]GOTO{label + 2} (OFF: REMOVED)"
     for (i, _), (low, high) in zip(r.terms, _plausible(r), strict=True):
-        yield f"IF[#{place[i.name]}EQ#0]GOTO{label + 3} ({_comment(i.name)}: VACANT. NOTHING CHANGES)"
-        yield f"IF[#{place[i.name]}LT{_real(low)}]GOTO{label + 3} (NOT PLAUSIBLE)"
+        yield f"IF[#{place[i.name]}EQ#0]GOTO{label + 3} ({_comment(i.name)}: VACANT. NO CHANGE)"
+        yield f"IF[#{place[i.name]}LT{_real(low)}]GOTO{label + 3} (IMPLAUSIBLE)"
         yield f"IF[#{place[i.name]}GT{_real(high)}]GOTO{label + 3}"
-    yield f"#1={_real(in_um(0.0 - r.model.intercept))} (WANTED IN UM: A CONTROL TAKES EIGHT DIGITS)"
+    yield f"#1={_real(in_um(0.0 - r.model.intercept))} (TARGET IN UM: A CONTROL ACCEPTS EIGHT DIGITS)"
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
         yield f"#1=#1-[{_real(in_um(factor))}*[#{place[i.name]}-[{_real(zero)}]]]"
     yield "#1=#1/1000.0 (IN MM)"

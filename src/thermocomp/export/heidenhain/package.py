@@ -11,53 +11,53 @@ from thermocomp.export.reduction.reducedpage import write_page
 from thermocomp.export.target import Target
 
 SIGN = (
-    "Sign: a formula is a dimension as it is: present dimension <L> plus the deviation (actual minus commanded) in mm; "
-    "a TNC 360 word is the correction in um, minus the deviation"
+    "Sign: a formula gives the actual dimension: present dimension <L> plus the deviation (actual minus commanded) in "
+    "mm; a TNC 360 word is the correction in um, which is minus the deviation"
 )
 UNITS = "Units: formula in mm, TNC 360 word in whole um, W<...> in degC"
 #: unconfirmed assumptions, stated at the top and repeated in the file
 UNCONFIRMED = (
-    "UNCONFIRMED: which way a dimension counts in your kinematics table; the wrong way doubles the error: try it as "
-    "the page says",
-    "UNCONFIRMED: which PLC word holds which temperature, and in which unit; W<...> stands for it",
-    "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 is of which axis",
-    "UNCONFIRMED: whether your software takes as many digits and brackets as the formula has",
+    "UNCONFIRMED: the sign of a dimension in your kinematics table; the wrong sign doubles the error: test it as "
+    "described in the page",
+    "UNCONFIRMED: which PLC word contains which temperature, and in which unit; replace W<...> by it",
+    "UNCONFIRMED: which of the words W576 to W582 of a TNC 360 belongs to which axis",
+    "UNCONFIRMED: whether your software version accepts as many digits and brackets as the formula has",
 )
 #: largest value of a TNC 360 word [um]
 _WORD = 32_767
 
 _ABOUT = """\
-A TNC 426/430 works out a dimension in its kinematics table by a formula (MP7530, TEMPCOMP), such as
-`300+3.45e-3*(W486-20)`: 300 mm, and 3.45e-3 mm more per degC of a PLC word. `{name}.txt` holds one per axis. A TNC
-360 takes words from the PLC, W576 to W582, of up to +-32,767 um, and follows them at 1 um/s; the display does not
-show it. An iTNC 530 (KinematicsComp, .COM tables) is not written for.
+A TNC 426/430 computes a dimension in its kinematics table by a formula (MP7530, TEMPCOMP), such as
+`300+3.45e-3*(W486-20)`: 300 mm, plus 3.45e-3 mm per degC of a PLC word. `{name}.txt` contains one formula per axis.
+A TNC 360 reads words from the PLC, W576 to W582, of up to +-32,767 um, and follows them at 1 um/s; the position
+display does not show this. The iTNC 530 (KinematicsComp, .COM tables) is not supported.
 
-What counts as zero is fixed: the temperatures in the formula, where the recording began. Set datums with the
-formula in force: they take in what it says then, and only changes count from there on."""
+The zero (reference temperatures) is fixed: the temperatures written in the formula, those at the start of the
+recording. Set datums with the formula in force: they then include its present value, and only later changes have an
+effect."""
 
 _INSTALL = """\
-1. Ask the machine builder which dimension of the kinematics table goes along the axis, and which PLC words hold the
-   temperatures {sensors}: **UNCONFIRMED** here. The PLC has to give them in degC; if a word holds tenths of it,
-   `W<...>` is that word divided by 10. Whole degrees are too coarse: {step} um per degC.
-2. Note the old line. Put its dimension for `<L>` and the words for `W<...>`, and enter the formula.
-3. Which way it counts is **UNCONFIRMED**; find out in two minutes: with an indicator at the tool, add 0.1 mm to the
-   dimension alone and have the axis go to the same position again. If the tool stands 0.1 mm further in the
-   **minus** direction of the axis, the formula is right as it is; if in the plus direction, turn every sign behind
-   `<L>`.
+1. Ask the machine builder which dimension of the kinematics table lies along the axis, and which PLC words contain
+   the temperatures {sensors}: this is **UNCONFIRMED**. The words must be in degC; if a word is in tenths of a degC,
+   `W<...>` is that word divided by 10. A resolution of 1 degC is too coarse: {step} um per degC.
+2. Make a note of the old line. Replace `<L>` by its dimension and `W<...>` by the words, and enter the formula.
+3. The sign of the dimension is **UNCONFIRMED**; to test it takes two minutes: with a dial indicator at the tool, add
+   0.1 mm to the dimension only, and move the axis to the same position again. If the tool is 0.1 mm further in the
+   **minus** direction of the axis, the formula is correct; if in the plus direction, reverse every sign after `<L>`.
 4. Set the datums again.
 
-TNC 360: the PLC works out `word` of `{name}.txt`, rounds it to whole um, keeps it within +-{most:g} um, and writes
-it every few seconds. Try the sign with +100 um: the axis has to go 0.1 mm in its plus direction."""
+TNC 360: the PLC computes `word` of `{name}.txt`, rounds it to whole um, limits it to +-{most:g} um, and writes it
+every few seconds. Test the sign with +100 um: the axis must move by 0.1 mm in its plus direction."""
 
 _CHECK = """\
-`{name}_vectors.csv` holds temperatures [degC], the growth that the formula has to say beyond `<L>` [mm], the
-correction that comes of it [um], and its tolerance; beyond the trained range, too. `python3 {name}_check.py`
-(Python alone) puts them into the formulas of `{name}.txt` and compares: exit code 0 if all agree. At the control:
-have the PLC write the temperatures of a row into the words, and read the dimension, or the way that the axis goes."""
+`{name}_vectors.csv` contains temperatures [degC], the growth that the formula must give in addition to `<L>` [mm],
+the resulting correction [um], and its tolerance, also beyond the trained range. `python3 {name}_check.py` (needs only
+Python) evaluates the formulas of `{name}.txt` and compares: exit code 0 if all agree. At the control: have the PLC
+write the temperatures of a row to the words, and read the dimension or the movement of the axis."""
 
 _OFF = """\
-Move the axes clear, put the old dimension back in place of the formula (TNC 360: let the PLC write 0, which the
-axis follows at 1 um/s), and set the datums again: a dimension that changes moves the tool at once."""
+Move the axes clear, replace the formula by the old dimension (TNC 360: let the PLC write 0, which the axis follows at
+1 um/s), and set the datums again. A changed dimension moves the tool immediately."""
 
 
 def write_heidenhain(
@@ -72,9 +72,9 @@ def write_heidenhain(
         lines += [
             "",
             f"; {r.model.target}: {', '.join(f'W<{marks[i.name]}> is {i.name} [degC]' for i, _ in r.terms)}",
-            "; UNCONFIRMED: the way it counts; <L> is the dimension that stands there now [mm]",
+            "; UNCONFIRMED: sign of the dimension; <L> is the dimension in the table now [mm]",
             f"{r.axis} formula: <L>{formula(r, marks)}",
-            f"; UNCONFIRMED: TNC 360, its word; correction [um], rounded, within +-{most:g}",
+            f"; UNCONFIRMED: word of a TNC 360; correction [um], rounded, within +-{most:g}",
             f"{r.axis} word: {formula(r, marks, word=True)}",
         ]
     page = write_page(
@@ -83,9 +83,9 @@ def write_heidenhain(
         reductions,
         what="a formula of a Heidenhain control",
         about=_ABOUT.format(name=name),
-        limits="the formula has none: neither magnitude nor rate. A TNC 360 follows at 1 um/s.",
-        failed="the formula takes whatever a word holds: one that reads 0 degC moves the axis by its whole term. Let "
-        "the PLC keep the last good value.",
+        limits="the formula limits neither magnitude nor rate. A TNC 360 follows at 1 um/s.",
+        failed="the formula uses any value of a word: a failed sensor that reads 0 degC moves the axis by the whole "
+        "term. Let the PLC keep the last valid value.",
         install=_INSTALL.format(
             name=name,
             sensors=", ".join(marks),

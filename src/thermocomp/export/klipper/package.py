@@ -13,8 +13,8 @@ from thermocomp.export.target import Target
 
 SIGN = (
     "Sign: Klipper adds -temp_coeff x (temperature - temperature at homing) to the commanded Z: a positive temp_coeff "
-    "lowers Z as it gets warmer. So temp_coeff is plus the deviation (actual minus commanded) per kelvin. Read in "
-    "Klipper's source (z_thermal_adjust.py, calc_adjust), not tried on a printer: try it as the page says"
+    "lowers Z as it gets warmer. So temp_coeff is plus the deviation (actual minus commanded) per kelvin. Taken from "
+    "Klipper's source (z_thermal_adjust.py, calc_adjust), not tested on a printer: test it as described in the page"
 )
 UNITS = "Units: temp_coeff in mm/K, temperatures in degC, times in s"
 #: largest coefficient accepted by Klipper [mm/K]
@@ -34,44 +34,44 @@ max_z_adjustment: {most}
 smooth_time: 10.0
 # s
 #z_adjust_off_above: 99999
-# mm: above this height the adjustment stays as it is
+# mm: above this height the adjustment does not change
 
 # FILL IN: the sensor of {sensor}, as for a [temperature_sensor]
 sensor_type: FILL_IN
 sensor_pin: FILL_IN
 min_temp: {low:g}
 max_temp: {high:g}
-# degC. Klipper stops the printer outside: check them
+# degC. Outside this range Klipper stops the printer: check these values
 """
 
 _ABOUT = """\
 Klipper computes `z_adjust = -temp_coeff * (temperature - temperature_at_homing)` [mm] and adds it to the commanded
-Z of every move in X or Y, not by less than a motor step at a time. What counts as zero is the smoothed temperature
+Z of every move in X or Y, in increments of at least one motor step. The zero (reference) is the smoothed temperature
 when Z was homed."""
 
 _INSTALL = """\
 1. Copy `[z_thermal_adjust]` from `{name}.cfg` into `printer.cfg` and fill in `sensor_type`, `sensor_pin`,
-   `min_temp` and `max_temp` of the sensor that the recording calls {sensor}. A `[temperature_sensor]` of the same
-   pin has to go.
-2. No other macro may shift Z by that temperature.
-3. `RESTART`, `G28`. Home again whenever Z is to count from the present temperature.
-4. Once, in two minutes: `SET_Z_THERMAL_ADJUST REF_TEMP=R` with R = the present temperature minus 10, then `G1` by a
-   millimetre in X and `SET_Z_THERMAL_ADJUST` alone: it tells "Applied Z adjustment", which has to be {ten} mm, and
-   the nozzle has to have gone {way}. `G28` ends the trial.
+   `min_temp` and `max_temp` of the sensor that the recording calls {sensor}. Remove a `[temperature_sensor]` that
+   uses the same pin.
+2. Make sure that no other macro shifts Z by that temperature.
+3. `RESTART`, `G28`. Home again whenever the present temperature is to become the zero.
+4. Test the sign once, which takes two minutes: `SET_Z_THERMAL_ADJUST REF_TEMP=R` with R = the present temperature
+   minus 10, then `G1` by a millimetre in X, then `SET_Z_THERMAL_ADJUST` without parameters: it prints "Applied Z
+   adjustment", which must be {ten} mm, and the nozzle must have moved {way}. `G28` ends the test.
 
-That says that Klipper takes the sign as it is meant here. That the recording counts as it should, you know: its
-deviation is actual minus commanded, positive where a warm nozzle stands further from the bed than it was told to."""
+This test shows that Klipper uses the sign as assumed here. Check the sign of the recording yourself: its deviation must
+be actual minus commanded, positive if a warm nozzle is further from the bed than commanded."""
 
 _CHECK = """\
-`{name}_vectors.csv` holds temperatures at homing and now [degC], the adjustment of Z that has to come out [um] and
-its tolerance; beyond the trained range, too. `python3 {name}_check.py` (Python alone) reads `temp_coeff` and
-`max_z_adjustment` out of `{name}.cfg`, or out of the file named behind it (`printer.cfg`), and compares: exit code
-0 if all agree. On the printer: `SET_Z_THERMAL_ADJUST REF_TEMP=` the temperature at homing of a row near the present
-one."""
+`{name}_vectors.csv` contains temperatures at homing and now [degC], the expected adjustment of Z [um] and its
+tolerance, also beyond the trained range. `python3 {name}_check.py` (needs only Python) reads `temp_coeff` and
+`max_z_adjustment` from `{name}.cfg`, or from a file given as argument (`printer.cfg`), and compares: exit code 0 if
+all agree. On the printer: choose a row whose present temperature is close to yours, and give its temperature at homing
+as `SET_Z_THERMAL_ADJUST REF_TEMP=`."""
 
 _OFF = """\
-`SET_Z_THERMAL_ADJUST ENABLE=0`: the adjustment stays as it is, without a jump, and is gone after the next `G28`.
-For good: take the section out of `printer.cfg`, `RESTART`, `G28`."""
+`SET_Z_THERMAL_ADJUST ENABLE=0`: the adjustment is frozen, without a jump, and removed by the next `G28`. To remove it
+permanently, delete the section from `printer.cfg`, then `RESTART` and `G28`."""
 
 
 def write_klipper(
@@ -106,9 +106,10 @@ def write_klipper(
         reductions,
         what="Klipper's [z_thermal_adjust]",
         about=_ABOUT,
-        limits=f"at most {limits.magnitude:g} um; no rate: what changes between two moves comes with the next one.",
-        failed="Klipper stops the printer if the temperature is beyond `min_temp` and `max_temp`; a wrong one within "
-        "them moves Z.",
+        limits=f"at most {limits.magnitude:g} um. The rate is not limited: a change between two moves is applied with "
+        "the next move.",
+        failed="Klipper stops the printer if the temperature is outside `min_temp` to `max_temp`; a wrong value "
+        "within that range is not detected and moves Z.",
         install=_INSTALL.format(
             name=name,
             sensor=sensor.name,

@@ -16,10 +16,10 @@ _COMPONENT = """{facts}component {component} "thermal compensation; {name}.md sa
 
 pin in float value-#[{inputs}] = NAN;   /* see {name}.md for their order and units */
 pin in bit good-#[{inputs}] = TRUE;     /* FALSE for a sensor that reports a failure */
-pin in u32 reading;              /* counts readings: values are new when it changes, and old if it does not */
-pin in bit enable = TRUE;        /* FALSE: corrections hold, and go to zero after that */
+pin in u32 reading;              /* counter of readings: the values are new when it changes */
+pin in bit enable = TRUE;        /* FALSE: corrections are held, then decay to zero */
 
-pin in bit motion-enabled;       /* of the controller: an external offset can move only then */
+pin in bit motion-enabled;       /* from the controller: external offsets can move only if TRUE */
 pin in bit all-homed;
 pin in bit coord-mode;
 pin in bit teleop-mode;
@@ -27,11 +27,11 @@ pin in bit teleop-mode;
 pin out float correction-#[{targets}];  /* [mm] */
 pin out float slope-#[{targets}];       /* [um/m] */
 pin out s32 status-#[{targets}];        /* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow */
-{faults}pin out s32 rejected;            /* why a reading was not used: 0 it was, 1 its time, 2 a value, 3 no start */
-pin out s32 outside;             /* how many inputs are beyond the trained range */
-pin out float scale = {resolution!r};     /* of the counts of external offsets [machine units] */
+{faults}pin out s32 rejected;            /* reason why a reading was not used: 0 used, 1 time, 2 value, 3 not a start */
+pin out s32 outside;             /* number of inputs beyond the trained range */
+pin out float scale = {resolution!r};     /* one count of an external offset [machine units] */
 pin out bit engaged;             /* external offsets can move */
-param rw float unit = 1.0;       /* machine units in a millimetre: 1, or 0.0393700787 for inches */
+param rw float unit = 1.0;       /* machine units per millimetre: 1, or 0.0393700787 for inches */
 
 function _ fp;
 option singleton yes;
@@ -44,19 +44,19 @@ include "{name}.c";
 #define SECOND 1000000000LL /* [ns] */
 #define MAGNITUDE {magnitude!r} /* um */
 #define RATE {rate!r} /* um/s */
-#define LARGEST 1e6 /* counts in a period */
+#define LARGEST 1e6 /* counts per period */
 
 enum {{ INPUTS = {inputs}, TARGETS = {targets} }};
 
-/* ends of the travel, from the reference position [mm]; none: the same at every position */
+/* ends of the travel, from the reference position [mm]; equal: independent of position */
 static const double travel[TARGETS][2] = {{{travel}}};
 
-static {name}_state state; /* all zero: begun */
-static double now[TARGETS][2]; /* the lines in force, at both ends of the travel [um] */
-static double base[TARGETS]; /* an offset that was found [machine units] */
-static long sent[TARGETS]; /* counts since then */
+static {name}_state state; /* all zero: started */
+static double now[TARGETS][2]; /* corrections in force at both ends of the travel [um] */
+static double base[TARGETS]; /* offset in force when it was engaged [machine units] */
+static long sent[TARGETS]; /* counts sent since then */
 static int lost[TARGETS];
-static long long since, waited; /* the last reading, the last step [ns] */
+static long long since, waited; /* time since the last reading, and since the last step [ns] */
 static hal_u32_t heard;
 static int fresh, could;
 
@@ -65,7 +65,7 @@ static double within(double value, double low, double high)
     return value < low ? low : value > high ? high : value;
 }}
 
-/* Return the counts by which an external offset lacks what it shall be; ends of the travel from the reference [mm]. */
+/* Return the counts to be added to an external offset; ends of the travel from the reference position [mm]. */
 static int lacking(int k, const double ends[2], double at, double request, int on, double seconds, double per_mm)
 {{
     const double count = {resolution!r} * per_mm, most = RATE * seconds;
@@ -73,13 +73,13 @@ static int lacking(int k, const double ends[2], double at, double request, int o
     int j;
 
     lost[k] = 0;
-    if (!on) {{ /* begin at what is in force */
+    if (!on) {{ /* start at the offset in force */
         base[k] = isfinite(request) ? request : 0.0;
         now[k][0] = now[k][1] = 1000.0 * base[k] / per_mm;
         sent[k] = 0;
         return 0;
     }}
-    /* what was asked for has to be there: else another one moves it, or nobody listens */
+    /* the requested offset must be in force, else another component moves it or it is not applied */
     lost[k] = !(fabs(request - (base[k] + (double)sent[k] * count)) < 0.5 * count);
     if (lost[k]) {{
         return 0;
@@ -101,7 +101,7 @@ FUNCTION(_)
 {{
     const hal_u32_t count = reading;
     const int can = motion_enabled && all_homed && (coord_mode || teleop_mode) && unit > 0.001 && unit < 1000.0;
-    const int on = can && could; /* in the first period LinuxCNC sets an offset that it has kept to zero */
+    const int on = can && could; /* in the first period LinuxCNC resets an offset from before to zero */
     int k;
 
     since += period;
@@ -147,21 +147,21 @@ _HAL = """{facts}
 loadrt {component}
 addf {hal} servo-thread
 
-# 1. Machine units in a millimetre: 0.0393700787 where [TRAJ]LINEAR_UNITS is inch.
+# 1. Machine units per millimetre: 0.0393700787 if [TRAJ]LINEAR_UNITS is inch.
 setp {hal}.unit 1.0
 
-# 2. FILL IN where readings come from, and take the first # away. Until then nothing moves.
-#    good-K may be left out. Count reading up with each new set of values: when it stands still, they are old.
+# 2. FILL IN the sources of the readings, and remove the first # of each line. Until then nothing moves.
+#    good-K is optional. Increment reading with each new set of values: if it does not change, the values are old.
 {sources}
 #net {hal}-reading SOURCE => {hal}.reading
 
-# 3. May an external offset move? If your HAL has one of these pins in a signal, use the name of that signal here.
+# 3. Whether an external offset may move. If your HAL connects one of these pins to a signal, use that signal here.
 net {hal}-enabled motion.motion-enabled => {hal}.motion-enabled
 net {hal}-homed motion.is-all-homed => {hal}.all-homed
 net {hal}-coord motion.coord-mode => {hal}.coord-mode
 net {hal}-teleop motion.teleop-mode => {hal}.teleop-mode
 
-# 4. Axes. Each wants OFFSET_AV_RATIO = 0.1 in its [AXIS_...] of the INI: without it nothing moves, and nothing says so.
+# 4. Axes. Each needs OFFSET_AV_RATIO = 0.1 in its [AXIS_...] of the INI: otherwise nothing moves, without a message.
 {axes}
 """
 

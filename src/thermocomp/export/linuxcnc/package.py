@@ -19,64 +19,67 @@ _README = """{facts}
 # {name}: thermal compensation in LinuxCNC's HAL
 
 `{component}.comp` is a component for the servo thread. It runs `{name}.c` once a second, without Python and
-without allocation, and moves external offsets of {letters} in steps of 0.01 um. For LinuxCNC 2.9 in user space
-(Debian's, or with a kernel of PREEMPT_RT), not for RTAI.
+without memory allocation, and moves external offsets of {letters} in steps of 0.01 um. It is for LinuxCNC 2.9 in user
+space (as in Debian, or with a PREEMPT_RT kernel), not for RTAI.
 
-The other way is `thermocomp linuxcnc setup` with `thermocomp serve`: models, page, journal and probings are kept by a
-service there, and HAL keeps the correction alone. Use one of the two.
+The alternative is `thermocomp linuxcnc setup` with `thermocomp serve`: there a service runs models, web page, journal
+and probings, and HAL only applies the correction. Use only one of the two.
 
-## Prove it
+## Verify it
 
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
-runs the models over their test vectors, faults among them, and compares with what thermocomp says. Its exit code is 0
-if all is well. Step 6 below proves the rest at the machine.
+runs the models on their test vectors, which include sensor faults, and compares the results with those of thermocomp.
+Its exit code is 0 if all agree. Step 6 below verifies the rest at the machine.
 
 ## Install it
 
 1. `sudo apt-get install linuxcnc-uspace-dev`, and in this folder: `sudo halcompile --install {component}.comp`.
-   After an update of LinuxCNC do it again. A warning that a frame is larger than 2560 bytes may be passed over: the
-   servo thread has a stack of 1 MB. The one call in which the zero becomes known, up to 300 s after power-on, takes
-   longer (0.4 ms on a desktop processor): home and cut after it.
-2. Copy `{name}.hal` beside the machine's INI, and add to its `[HAL]`, behind the other lines:
+   Repeat this after an update of LinuxCNC. A warning that a frame is larger than 2560 bytes can be ignored: the
+   servo thread has a stack of 1 MB. The single call that computes the zero (reference temperatures), up to 300 s after
+   power-on, takes longer (0.4 ms on a desktop processor): home and cut only after it.
+2. Copy `{name}.hal` to the folder of the machine's INI file, and add as the last line of its section `[HAL]`:
    `HALFILE = {name}.hal`.
 3. Add `OFFSET_AV_RATIO = 0.1` to {sections}: the share of speed and
-   acceleration that an external offset may take. Without it LinuxCNC takes offsets and does nothing. Nothing else may
-   use an external offset of these axes.
-4. `{name}.hal` has places to **FILL IN**: where each value comes from. A value that comes from nowhere is missing, and
-   without a count of `reading` nothing ever moves.
-5. Have whoever reads the sensors write all values, and then count `reading` up (any change will do), every second or
-   ten. If that stands still, the values are old. Where values come from inputs that the servo thread reads itself, let
-   a `charge_pump` count through `conv_bit_u32`, and give the watchdog of the card, inverted, to `good-K`.
-6. Start LinuxCNC, home, and look: `halcmd show pin {hal}`. `rejected` has to be 0 within the second of a reading, and
-   `engaged` TRUE when the machine is on, homed, and in MDI, AUTO or jogging axes. Once a correction is not zero,
-   {offsets} must be as large, in machine units. **Try the sign**: with a dial gauge on the axis, the tool has to move
-   by the correction, in plus direction if it is positive. `motion.eoffset-limited` is TRUE while a soft limit cuts it.
+   acceleration available to an external offset. Without it LinuxCNC accepts offsets but does not apply them. No other
+   component may use an external offset of these axes.
+4. In `{name}.hal`, **FILL IN** the source of each value. A value without a source is missing, and as long as `reading`
+   does not count, nothing moves.
+5. The program that reads the sensors must write all values and then increment `reading` (any change is sufficient),
+   every one to ten seconds. If `reading` does not change, the values count as old. If the servo thread itself reads the
+   inputs, connect a `charge_pump` through `conv_bit_u32` to `reading`, and the inverted watchdog of the card to
+   `good-K`.
+6. Start LinuxCNC, home, and check `halcmd show pin {hal}`: `rejected` must be 0 within a second of a reading, and
+   `engaged` TRUE when the machine is on, homed, and in MDI, AUTO or jogging of axes. Once a correction is not zero,
+   {offsets} must have the same value, in machine units. **Test the sign**: with a dial indicator on the axis, the tool
+   must move by the correction, in the plus direction if it is positive. `motion.eoffset-limited` is TRUE while a soft
+   limit restricts the offset.
 
-| value | what it is | unit |
+| value | meaning | unit |
 |---|---|---|
 {values}
 
-| correction | of | {line} |
+| correction | target | {line} |
 |---|---|---|
 {corrections}
 
 {zero} {status}{sensors}
 
-A reading counts once: between readings `rejected` is 1 and `status-K` 2, and nothing moves.
+Each reading is used once: between readings `rejected` is 1 and `status-K` 2, and nothing moves.
 
-A value that is NaN or not plausible, `good-K` FALSE, and a `reading` that stands still move no axis: the correction
-stays for {hold:g} s and then goes to zero. Where an offset is not what was asked for, because something else clears or
-moves it, {losts} TRUE and nothing is sent until the machine was off and on.
+A value that is NaN or implausible, `good-K` FALSE, or an unchanged `reading` moves no axis: the correction is held for
+{hold:g} s and then decays to zero. If an offset differs from the requested one because another component clears or
+moves it, {losts} TRUE, and nothing is sent until the machine has been switched off and on.
 
-When the machine is switched on again, LinuxCNC has set its offsets to zero; they come back no faster than the rate. It
-takes the place where the axis stands for the commanded one then, until the next absolute move. `#5063` of a probing has
-the external offset in it.
+When the machine is switched off, LinuxCNC sets its offsets to zero; after it is switched on, they return at the rate
+limit. Until the next absolute move, LinuxCNC then regards the actual position of the axis as the commanded one. The
+probed position in `#5063` includes the external offset.
 
 ## Switch it off
 
-`halcmd setp {hal}.enable 0`: the corrections stay for {hold:g} s and then go to zero, slowly. Once they are zero, take
-the line out of the INI. Never set `axis.L.eoffset-clear` or take `eoffset-enable` away before: the axis would jump.
+`halcmd setp {hal}.enable 0`: the corrections are held for {hold:g} s and then decay slowly to zero. Once they are zero,
+remove the line from the INI file. Do not set `axis.L.eoffset-clear` or reset `eoffset-enable` before: the axis would
+jump.
 """
 
 

@@ -41,6 +41,6 @@ def residuals(reductions: Sequence[Reduction]) -> Drawn:
             add_legend(ax, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(lines), borderaxespad=0.0)
             ax.margins(x=0)
         panels[-1].set_xlabel(
-            "unseen cycles, one after the other [h]: none of them was learned from where it is judged"
+            "time [h]: unseen cycles, one after the other; each is judged with a model fitted without it"
         )
         return svg(figure)

@@ -175,12 +175,14 @@ def _left_outs(blocks: Sequence[Assessment], full: Sequence[Assessment]) -> list
 
 def _beside(model: ErrorModel, method: str, judging: Judging) -> str:
     if method:
-        return f"{method}, fitted again for this; both are judged alike: {judging.name}"
+        return (
+            f"method {method}, fitted again for this comparison; both models are judged in the same way: {judging.name}"
+        )
     if model.honest_error is None:
-        return "the model's method is not known here, and the model was never judged on unseen cycles"
+        return "the method of the model is not known, and the model was never judged on unseen cycles"
     return (
-        "the model's method is not known here with its settings: its error is that in the model file, on "
-        f"{model.honest_error.protocol}, not on the cycles of these recordings"
+        "the method of the model, or its settings, are not known: the error is that in the model file "
+        f"({model.honest_error.protocol}), not one on the cycles of these recordings"
     )
 
 

@@ -12,12 +12,14 @@ class ReductionOptions:
     Parameters
     ----------
     most_loss : float
-        Largest tolerated loss: RMS on unseen cycles divided by that of the full model.
+        Largest tolerated loss of accuracy of the simpler model: its RMS on unseen cycles divided by that of the full
+        model.
     axes : list of str
-        Targets to export and their axes, such as ch5_um=Z. Default: the axes given by the names of the targets, such as
-        Z for z_um.
+        Targets to export and their axes, such as ch5_um=Z. Default: the axes in the names of the targets, such as Z for
+        z_um.
     sensors : list of str
-        Temperatures available at the controller, from which the inputs are selected. Default: all of the recordings.
+        Temperatures available at the controller, from which the inputs are selected. Default: all temperatures of the
+        recordings.
     harm_margin : float
         Tolerated degradation in a single cycle [um]. Default: as in ``thermocomp fit``.
     jobs : int

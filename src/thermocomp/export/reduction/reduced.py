@@ -116,8 +116,8 @@ class Reduced:
         more = self.reduced.rms - self.full.rms
         way = "more" if more >= 0 else "less"
         return (
-            f"RMS {self.reduced.rms:.2f} um on unseen cycles, {abs(more):.2f} um {way} than the full model: "
-            f"{self.loss:.2f} times"
+            f"RMS {self.reduced.rms:.2f} um on unseen cycles, {abs(more):.2f} um {way} than the full model "
+            f"({self.loss:.2f} times its RMS)"
         )
 
     def why_not(self, most_loss: float) -> str:
@@ -130,7 +130,9 @@ class Reduced:
         if math.isnan(self.loss):
             return "the loss cannot be stated: the error of the full model on unseen cycles is not known"
         if self.loss > most_loss:
-            return f"loses too much: {self.loss_in_words}; at most {most_loss:g} times is permitted (--most-loss)"
+            return (
+                f"loses too much accuracy: {self.loss_in_words}; at most {most_loss:g} times is permitted (--most-loss)"
+            )
         if found.word == "unproven" and not found.taken:
             return f'unproven: {found.why} (to approve its use nevertheless: --accept-unproven "NAME, REASON")'
         return ""
@@ -189,7 +191,7 @@ def as_it_is(model: ErrorModel, axis: str) -> Reduced:
     return Reduced(
         model=model,
         axis=axis,
-        beside="the model already has this form, here with five digits; its error is that in the model file",
+        beside="the model already has this form, written here with five digits; its error is that in the model file",
         none=none,
         full=own,
         reduced=own,
@@ -259,5 +261,9 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
         words.append(f"{r.model.target}: {'UNPROVEN, approved nevertheless' if taken else 'accepted on unseen cycles'}")
         more += [f"{r.model.target}: unproven, approved by {taken}"] if taken else []
         more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
-    kind = "reduced to what the controller holds" if any(r.cycles for r in reductions) else "the model as it is"
+    kind = (
+        "reduced to a form that the controller supports"
+        if any(r.cycles for r in reductions)
+        else "the full model, not reduced"
+    )
     return [f"{'; '.join(words)}; {kind}", *more, *facts.origin(), sign, units]

@@ -10,9 +10,9 @@ _PAGE = """{head}
 
 {about}
 
-## What it leaves
+## Residual error
 
-On cycles that it has not seen:
+On unseen cycles:
 
 | [um] | no compensation | full model | reduced |
 |---|---|---|---|
@@ -37,10 +37,10 @@ On cycles that it has not seen:
 {off}
 """
 
-_LOST = """- **State**: the formula knows the present temperatures alone: no lag, no spindle speed, no history.
+_LOST = """- **State**: the formula uses only the present temperatures: no lag, no spindle speed, no history.
 - **Limits**: {limits}
 - **Failed sensors**: {failed}
-- **Range**: nothing is held or faded beyond the trained range: {ranges}.
+- **Range**: outside the trained range the correction is neither held nor faded. Trained range: {ranges}.
 """
 
 
@@ -88,13 +88,16 @@ def _more(reductions: Sequence[Reduced], figure: str) -> Iterator[str]:
     for r in reductions:
         if r.replayed is not None:
             yield (
-                f"{r.model.target}: over the recordings that it was fitted to, the numbers as they are written leave "
-                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. That is no honest error, but "
-                "whoever replays them must find it.\n"
+                f"{r.model.target}: on the recordings to which it was fitted, the exported numbers leave a residual of "
+                f"RMS {r.replayed.rms:.3f} um, largest {r.replayed.largest:.3f} um. This is not an error on unseen "
+                "data; it serves to check a replay of these recordings.\n"
             )
         if r.cycles:
-            yield f"{r.model.target}: what was fitted without each cycle, and the RMS [um] that it leaves there:\n"
-            yield "| without | um per K | no compensation | full model | reduced |\n|---|---|---|---|---|"
+            yield (
+                f"{r.model.target}: coefficients fitted without each cycle, and the RMS of the residual on that cycle "
+                "[um]:\n"
+            )
+            yield "| cycle left out | um per K | no compensation | full model | reduced |\n|---|---|---|---|---|"
             for c in r.cycles:
                 factors = linear_factors(c.model) or []
                 said = ", ".join(f"{i.name} {f!r}" for i, f in zip(c.model.inputs, factors, strict=True) if f)
@@ -103,7 +106,7 @@ def _more(reductions: Sequence[Reduced], figure: str) -> Iterator[str]:
                 yield f"| {c.name} | {said} | {_number(c.none)} | {_number(c.full)} | {_number(c.reduced)} |"
             yield ""
     if figure:
-        yield f"![deviation, and what the full and the reduced model leave of it]({figure})\n"
+        yield f"![deviation, and the residuals of the full and the reduced model]({figure})\n"
 
 
 def _number(value: float) -> str:

@@ -20,10 +20,11 @@ TAKEN = {
 _PAGE = """
 ## Into the NC
 
-For a SINUMERIK ONE, whose PLC is an S7-1500. The PLC of an 840D sl (S7-300) knows no LReal, that of an 828D or
-808D no SCL: there another computer has to run the compensator (C99 or `thermocomp serve`).
+For a SINUMERIK ONE, whose PLC is an S7-1500. The PLC of an 840D sl (S7-300) does not support LReal, that of an 828D or
+808D does not support SCL: there a separate computer must run the compensator (C99 or `thermocomp serve`).
 
-dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` makes these of `correction` and `slope` of `{name}`:
+dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` computes these values from `correction` and `slope` of
+`{name}`:
 
 | output | setting data | unit |
 |---|---|---|
@@ -31,24 +32,24 @@ dK(T, P) = K0(T) + tan beta(T) (P - P0). The block `{name}_sd` makes these of `c
 | `tan_beta[k]` | SD43910 `$SA_TEMP_COMP_SLOPE` | |
 | `p0[k]` | SD43920 `$SA_TEMP_COMP_REF_POSITION` | mm |
 
-k, the axis, what it takes, and its machine data:
+Axes, their targets, and their machine data:
 
-| k | axis | of | MD32750 `$MA_TEMP_COMP_TYPE` | MD32760 `$MA_COMP_ADD_VELO_FACTOR`, at least |
+| k | axis | target | MD32750 `$MA_TEMP_COMP_TYPE` | MD32760 `$MA_COMP_ADD_VELO_FACTOR`, at least |
 |---|---|---|---|---|
 {rows}
 
-The PLC writes the setting data, in a cycle of seconds to minutes. **UNCONFIRMED**: with which block of your PLC it
-writes NC variables (the builder's manual says so), and `direction`, whether the NC takes the value off the command (-1,
-as the vendor's worked example of a screw that grows has it) or adds it. Try it, MD32750 being
-set, the axis referenced, the spindle standing and an indicator on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis
-at 0.02 and all else at 0, the axis moves by 0.02 mm; by minus 0.02 mm if the NC takes it off.
+The PLC writes the setting data every few seconds to minutes. **UNCONFIRMED**: the block by which your PLC writes NC
+variables (see the machine builder's manual), and `direction`, that is whether the NC subtracts the value from the
+command (-1, as in the vendor's worked example of a growing screw) or adds it (1). Test this with MD32750 set, the axis
+referenced, the spindle stopped and a dial indicator on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis at 0.02
+and all other values at 0, the axis moves by +0.02 mm, or by -0.02 mm if the NC subtracts the value.
 
-At power-on the block begins with corrections of 0, and the setting data are still what was written last: write them
-as 0 before the axes are referenced.
+At power-on the block starts with corrections of 0, but the setting data still have the values written last: write 0 to
+them before the axes are referenced.
 
-The NC moves an axis by a changed value at most with dv = MD32000 x MD32760, spread over cycles; tan beta is limited to
-MD32760. Here a correction changes by at most {rate:g} um/s = {speed:g} mm/min. With MD32760 = 0.01 (the 808D's
-default; at most 0.10 there) and MD32000 = 10000 mm/min, dv is 100 mm/min.
+The NC applies a changed value at a speed of at most dv = MD32000 x MD32760, distributed over several cycles; tan beta
+is limited to MD32760. Here a correction changes by at most {rate:g} um/s = {speed:g} mm/min. With MD32760 = 0.01 (the
+808D's default; at most 0.10 there) and MD32000 = 10000 mm/min, dv is 100 mm/min.
 """
 
 

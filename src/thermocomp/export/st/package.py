@@ -17,13 +17,13 @@ from thermocomp.runtime.program.tables import Tables, gather
 
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
-Make an object of each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration above,
-statements below, without the `END_...` of a POU), and the same with `{name}_test.st`.""",
-    "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project: Add > Existing item, all of
-them.""",
+Create an object for each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration in the
+upper part, statements in the lower part, without the `END_...` of a POU); do the same for `{name}_test.st`.""",
+    "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project, add all of them: Add > Existing
+item.""",
     "scl": """`{name}.scl` is an external source. TIA Portal: External source files > Add new external file, then
-Generate blocks from source; the same with `{name}_test.scl`. For S7-1500 (LReal, and optimized data: {kilobytes} kB
-for an instance).""",
+Generate blocks from source; do the same for `{name}_test.scl`. For S7-1500 only (it needs LReal and optimized data:
+{kilobytes} kB per instance).""",
 }
 
 _README = """{facts}
@@ -31,47 +31,49 @@ _README = """{facts}
 # {name}: thermal compensation in structured text ({dialect})
 
 {install}
-**Not confirmed:** the text was parsed and run outside the vendor's tools; nobody has compiled it in them
+**Not confirmed:** the text was parsed and run outside the vendor's tools, but has not been compiled in them
 yet.
 
-## Prove it
+## Verify it
 
-Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE: `wrong` has
-to be 0 then, and `largest`, the largest difference to thermocomp as a share of a correction (in um below 1 um), below
-{tolerance:.1g}. Faults are among the vectors. Remove the test and its vectors afterwards.
+Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE. `wrong`
+must then be 0, and `largest`, the largest difference from thermocomp relative to the correction (in um for corrections
+below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults. Remove the test and its vectors
+afterwards.
 
 ## Run it
 
-Call one instance of `{name}` in a cyclic task of ten seconds. At a shorter cycle the one call in which the zero becomes
-known has more to sort (300 s / cycle readings of each input): mind the watchdog. It needs LREAL.
+Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds. With a shorter cycle, the single call
+that computes the zero (reference temperatures) takes longer, since it sorts 300 s / cycle time readings of each input:
+observe the watchdog time of the task. The block needs LREAL.
 
-| input | what it is |
+| input | meaning |
 |---|---|
 | `value[k]` | see below |
-| `good[k]` | FALSE for a sensor that says nothing or reports a failure |
-| `age` | seconds since the values were measured |
-| `elapsed` | seconds since the call before, measured or the cycle time of the task |
-| `restart` | when it becomes TRUE: temperatures count from now on; corrections stay and move from where they are |
+| `good[k]` | FALSE for a sensor without a reading or with a reported failure |
+| `age` | time since the values were measured [s] |
+| `elapsed` | time since the previous call, measured or the cycle time of the task [s] |
+| `restart` | rising edge: the present temperatures become the zero; the corrections continue without a jump |
 
-| value | what it is | unit |
+| value | meaning | unit |
 |---|---|---|
 {values}
 
-| correction | of | {line} |
+| correction | target | {line} |
 |---|---|---|
 {corrections}
 
 {geometry}{zero} {status}{sensors}
 
-{about}## Try the sign
+{about}## Test the sign
 
 {sign}
 
 ## Switch it off
 
-Do not set the correction to zero at once: the axis would jump. Call the block with an age of 1.0E+9: the correction
-stays where it is for {hold:g} s and then goes to zero, slowly. The controller must not compensate for temperature
-itself at the same time.
+Do not set the correction to zero in one step: the axis would jump. Instead, call the block with an age of 1.0E+9: the
+correction is held for {hold:g} s and then decays slowly to zero. Do not use the controller's own temperature
+compensation at the same time.
 """
 
 _OBJECT = """<?xml version="1.0" encoding="utf-8"?>

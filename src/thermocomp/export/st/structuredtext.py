@@ -107,7 +107,9 @@ def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
             lines.append(f"{mark}s.{safe(n)} := {zero};")
     own = quoted(f"{name}_start", scl)
     parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(SCL if scl else [])]
-    parts += ["(* Begin again: temperatures count from now on; corrections stay, and move from where they are. *)"]
+    parts += [
+        "(* Restart: the present temperatures become the zero; corrections continue from their present values. *)"
+    ]
     parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
     parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
     return SourceUnit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")

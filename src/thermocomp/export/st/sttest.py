@@ -75,7 +75,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
     parts = [
         f"FUNCTION_BLOCK {quoted(f'{name}_test', scl)}",
         *(SCL if scl else []),
-        f"(* Runs {name} over its test vectors, one in each cycle: done after {calls}; wrong has to be 0 then. *)",
+        f"(* Runs {name} on its test vectors, one per cycle: done after {calls} cycles; wrong must then be 0. *)",
         section("VAR_OUTPUT", {"row": "DINT", "wrong": "DINT", "largest": "LREAL", "done": "BOOL"}),
         section(
             "VAR",

@@ -155,9 +155,9 @@ def time_constants(settlings: Sequence[Settling]) -> str:
         for label, style in (
             ("t63 read from the curve", {"marker": "|", "ms": 9, "color": MEASURED}),
             ("t90", {"marker": "|", "ms": 9, "color": NONE}),
-            ("not settled: later", {"marker": ">", "color": NONE, "mfc": "white"}),
-            ("tau of one exponential, ± standard error", {"marker": "o", "color": PREDICTED}),
-            ("of two", {"marker": "D", "color": RESIDUAL, "mfc": "white"}),
+            ("not settled: t63 or t90 is later", {"marker": ">", "color": NONE, "mfc": "white"}),
+            ("tau of a single exponential, ± standard error", {"marker": "o", "color": PREDICTED}),
+            ("taus of two exponentials", {"marker": "D", "color": RESIDUAL, "mfc": "white"}),
         ):
             panels[0].plot([], [], ls="", label=label, **{"ms": 5, **style})
         add_legend(figure, loc="outside upper right", ncols=5, fontsize=7.5, handletextpad=0.2, columnspacing=1.2)

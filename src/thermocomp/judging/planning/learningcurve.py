@@ -101,9 +101,10 @@ class LearningCurve:
             return f"{of}, {self.none:.2f} without compensation: the model does not help on unseen cycles"
         if self.enough:
             return (
-                f"{of}; {slope}: more cycles of the same kind are not worth their time (less than {self.worth:.2f} um)"
+                f"{of}; {slope}: more cycles of the same kind are not worth the time (a gain below {self.worth:.2f} um "
+                "each)"
             )
-        return f"{of}; {slope}: the error still decreases, more cycles of the same kind help"
+        return f"{of}; {slope}: the error is still decreasing, so more cycles of the same kind help"
 
 
 def learning_curve(

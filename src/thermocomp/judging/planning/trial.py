@@ -37,6 +37,7 @@ class Trial:
         """Description of the test as text."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
-            return f"spindle is stopped {longest / 3600:g} h, the room changes"
+            return f"spindle stopped for {longest / 3600:g} h while the room temperature changes"
         run = f"{self.speed:,.0f} 1/min for {longest / 3600:g} h"
-        return {"run": run, "stop": f"{run}, then a stop as long"}.get(self.kind, f"{run}, stop as long, repeated")
+        stopped = {"run": run, "stop": f"{run}, then a stop of equal length"}
+        return stopped.get(self.kind, f"{run} and a stop of equal length, repeated")

@@ -106,9 +106,9 @@ class Running:
                 if self.phase.kind == "warm-up"
                 else "the test may end, or continue to the next speed"
             )
-            return f"{what}: the steady state is known; {then}"
+            return f"{what}: the steady state is known accurately enough; {then}"
         open_ = ", ".join(f"{n} (+-{s.uncertainty:.1f}, required {s.limit:.1f})" for n, s in self.states if not s.known)
-        return f"{what}: continue; not known yet: {open_}"
+        return f"{what}: continue; the steady state is not known accurately enough of {open_}"
 
 
 def foretell(time: FloatArray, values: FloatArray) -> SteadyState:

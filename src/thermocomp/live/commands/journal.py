@@ -31,10 +31,12 @@ def journal(
     Parameters
     ----------
     what : {'show', 'export'}
-        Action. show: numbers of records and the last events. export: a recording with the temperatures, the
-        measurements, the correction confirmed by the controller, and the uncompensated deviation, for fit.
+        Action. show: print the number of records and the latest events. export: write a recording for thermocomp fit,
+        with the temperatures, the measurements, the correction confirmed by the controller, and the uncompensated
+        deviation.
     path : Path
-        Path of the journal as in the configuration of the service, to read all its files; or one of these files.
+        Path of the journal as in the configuration of the service, to read all files of the journal; or one of these
+        files.
     output : Path
         Output recording (.csv or .parquet).
     every : float
@@ -111,7 +113,7 @@ def _show(reader: "JournalReader", last: int, *, as_json: bool) -> None:
         lines.append(f"from {_stamp(summary.first)} to {_stamp(summary.last)}")
     lines.append(", ".join(f"{n:,} {kind}" for kind, n in summary.counts.items() if n) or "nothing yet")
     if summary.lost:
-        lines.append(f"{summary.lost:,} rows were lost while the disk could not be written")
+        lines.append(f"{summary.lost:,} rows were lost because the disk could not be written")
     for line in (*lines, *(f"{_stamp(time)}  {kind}  {text}" for time, kind, text in events)):
         console.print(words(line), soft_wrap=True)
 
@@ -133,11 +135,11 @@ def told(stored: "StoredRun", reader: "JournalReader") -> tuple[str, str]:
         under = {None: "an unknown correction", False: "no correction"}.get(row.compensated, "a correction")
         if row.in_force is not None and row.compensated:
             under = f"a correction of {row.in_force.at(row.position):+.2f} um"
-        text = f"{row.target} {row.kind} {row.value:+.2f} um under {under}, "
+        text = f"{row.target} {row.kind} {row.value:+.2f} um, measured with {under}, "
         text += "included in the value" if row.includes_offset else "not included in the value"
         text += "; the deviation is not known" if known is None else f"; deviation {known:+.2f} um"
         if row.kind != "probing" and row.includes_offset and row.compensated is not False:
-            text += "; the correction counts twice while it remains in force"
+            text += "; the correction is applied twice while it remains in force"
         return kind, text
     if isinstance(row, StateRow):
         return kind, f"{row.target} {row.word}" + (f": {row.reason}" if row.reason else "")

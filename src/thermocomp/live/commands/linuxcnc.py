@@ -40,22 +40,22 @@ def linuxcnc(
     ini : Path
         INI file of the machine.
     pattern : {'offset', 'drive'}
-        Path of the corrections. offset: external offsets, which are visible to the controller and stay within its soft
-        limits; drive: between controller and drive, which the position display does not show.
+        How the corrections are applied. offset: as external offsets, which the controller displays and keeps within its
+        soft limits; drive: between controller and drive, where the position display does not show them.
     axes : str
         Letters of the axes to correct, such as XZ.
     magnitude : float
-        Largest correction, regardless of the service [um].
+        Largest correction, whatever the service sends [um].
     rate : float
-        Fastest change of a correction, regardless of the service [um/s].
+        Fastest change of a correction, whatever the service sends [um/s].
     timeout : float
-        Time without a message after which the service is treated as disconnected [s].
+        Time without a message after which the service counts as disconnected [s].
     hold : float
         Hold time of the corrections after a disconnect [s].
     fade : float
         Rate at which corrections ramp to zero after the hold time [um/s].
     group : str
-        User group whose members may connect. Default: only the user that runs LinuxCNC.
+        User group whose members may send corrections. Default: only the user that runs LinuxCNC.
     output : Path
         Output folder. Default: the folder of the INI file.
     overwrite : bool

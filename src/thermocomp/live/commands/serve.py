@@ -39,17 +39,17 @@ def serve(
     output: Path = Path("thermocomp-live"),
     check: bool = False,
 ) -> int:
-    """Run the compensator live: sensors in, corrections out, with a page to watch.
+    """Run the compensator live: sensors in, corrections out, with a web page to monitor it.
 
     Parameters
     ----------
     config : Path
-        TOML configuration file: models, sources, sinks, limits, page.
+        TOML configuration file: models, sources of readings, sinks for corrections, limits, web page.
     demo : bool
-        Run a demo without a configuration: the virtual machine at 60 times real time, with a model that is fitted to a
-        recording of it first (a minute or more).
+        Run a demo without a configuration: the virtual machine at 60 times real time, with a model that is first fitted
+        to a recording of it (this takes a minute or more).
     port : int
-        Port of the page, overrides the configured one; 0: any free port.
+        Port of the web page; overrides the configured one. 0: any free port.
     output : Path
         Output folder of the demo: its model, state and corrections.
     check : bool
@@ -116,7 +116,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
         if not fades or fading:  # a second stop request skips the fade
             task.cancel()
             return
-        console.print("stopping: the corrections go to zero first; interrupt again to stop immediately")
+        console.print("stopping: the corrections fade to zero first; stop again to skip this")
         fading.append(asyncio.create_task(service.fade_out()))
         fading[0].add_done_callback(lambda _: task.cancel())
 
@@ -127,7 +127,7 @@ async def _run(service: "Service", fades: bool, work: Sequence[Coroutine[Any, An
             for one in work:
                 group.create_task(one)
     kept = f"the state is not saved: {service.keeper.not_saved}" if service.keeper.not_saved else "the state is saved"
-    console.print(words(f"stopped: the corrections stay as they are now; {kept}"), soft_wrap=True)
+    console.print(words(f"stopped: the corrections keep their present values; {kept}"), soft_wrap=True)
 
 
 def _demo(folder: Path) -> Path:
@@ -135,7 +135,7 @@ def _demo(folder: Path) -> Path:
     config, model = folder / "serve.toml", folder / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     if not model.exists():
-        console.print("A model of the virtual machine is fitted to a recording of it, a minute or more ...")
+        console.print("Fitting a model of the virtual machine to a recording of it (a minute or more) ...")
         with needs("study"):
             from thermocomp.api.verbs import fit
         from thermocomp.virtual.verbs import simulate
@@ -151,7 +151,7 @@ def _demo(folder: Path) -> Path:
     return config
 
 
-_CONFIG = """# thermocomp serve --demo: the virtual machine, {speed} times as fast as real time
+_CONFIG = """# thermocomp serve --demo: the virtual machine at {speed} times real time
 models = ["model.json"]
 state = "state.json"
 speed = {speed}.0

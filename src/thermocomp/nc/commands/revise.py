@@ -28,7 +28,7 @@ MANY = 1000
 
 _GROUPS = {
     "Drift: models and inputs": Drifting,
-    "Initial thermal state: exactly one of cold, carried, measured": Starting,
+    "Initial thermal state: exactly one of --cold, --carried, --measured": Starting,
     "Revision": Way,
     "Controller: settings that are not in the program": Controller,
     "Machining time": Timing,
@@ -118,10 +118,13 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
-            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each that of the original plus "
-            f"its correction, within {max(proof.largest, 0.001):.3f} um",
+            f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')}, each equal to the original plus "
+            f"its correction within {max(proof.largest, 0.001):.3f} um",
         )
-        say("[green]proved[/]", f"{proof.sentence}; the time of each move within {max(proof.slower, 0.1):.1f} %")
+        say(
+            "[green]proved[/]",
+            f"{proof.sentence}; the duration of each move is equal within {max(proof.slower, 0.1):.1f} %",
+        )
     for warning in outcome.warnings(job, done):
         say("[yellow]but[/]", warning)
     for note in (*notes, *outcome.describe_place(job, done)):
@@ -129,7 +132,7 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     took = f"revised in {done.seconds:.1f} s"
     if revision.lines >= MANY:
         took += f", {1e6 * done.seconds / revision.lines:.0f} us per line"
-    console.print(f"[dim]{took}; proof and picture {done.proving:.1f} s[/]")
+    console.print(f"[dim]{took}; verification and figure {done.proving:.1f} s[/]")
     if done.written:
         say("", f"Written: {', '.join(map(str, job.paths.all()))}")
     else:
@@ -147,7 +150,9 @@ def _bounds(bounds: Sequence[Bound]) -> Layout:
         Column("model", lambda b: _known(b, b.model), "um"),
         Column("bound", lambda b: _known(b, b.most), "um"),
     )
-    caption = "um; bound of a cut = residual between updates + largest error of the model on unseen cycles"
+    caption = (
+        "um; model: largest error of the model on unseen cycles; bound of a cut = residual between updates + model"
+    )
     return Layout(columns, bounds, caption=caption)
 
 

@@ -80,8 +80,8 @@ def _said(bound: Bound, *, cut: bool) -> str:
     """Return the title of a panel: drift, residual, and bound, which includes the error of the model."""
     far = max(abs(bound.low), abs(bound.high))
     if not cut:
-        return f"the tool drifts by up to {far:.1f} um; nothing is cut"
-    wrong = "the model was never judged: no bound" if math.isnan(bound.model) else f"bound {bound.most:.1f} um"
+        return f"the tool drifts by up to {far:.1f} um; the program makes no cuts"
+    wrong = "no bound, since the model was never judged" if math.isnan(bound.model) else f"bound {bound.most:.1f} um"
     return f"the tool drifts by up to {far:.1f} um; residual in the cuts at most {bound.left:.1f} um; {wrong}"
 
 

@@ -50,7 +50,7 @@ def describe_proof(proof: Proof | None, lines: int) -> list[str]:
 
 def describe_place(revision: Revision, axes: Sequence[str]) -> list[str]:
     """Return the lines about the origins and tools of the revision, and the error with others."""
-    return [*wrap_text(f"made for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
+    return [*wrap_text(f"valid for {describe_origins(revision)}", _PLACE - 1), cost(revision.elsewhere, axes)]
 
 
 def describe_origins(revision: Revision) -> str:

@@ -37,16 +37,17 @@ class Way:
     ----------
     method : str
         Method of correction. coordinates: the correction is added to the X, Y and Z words; offset: G52 shifts the work
-        coordinates, only where the tool is up; requires --no-g92.
+        coordinates, only where the tool is up (see --safe-z); requires --no-g92.
     every : str
         Interval at which the correction is updated, such as "10 min".
     tolerance : str
-        Change of the drift at which the correction is updated; with --every it applies only along the path, where the
-        drift depends on the position.
+        Change of the drift that triggers an update of the correction. With --every, only changes along the path do, if
+        the drift depends on the position.
     step : str
-        Largest change of the correction in a cut per 10 mm of path, distributed over the block.
+        Largest change of the correction per 10 mm of path in a cut; it is distributed over the block.
     largest : str
-        Largest plausible correction; a larger one is refused, because it is not a thermal drift.
+        Largest plausible correction. A program that needs a larger one is refused, because thermal drift is not that
+        large.
     safe_z : str
         Work coordinate Z at and above which the tool is up and there is no cut. Default: the tool counts as up after a
         rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
@@ -55,11 +56,11 @@ class Way:
         by more than one correction step at mid-cut (method coordinates, linuxcnc).
     expand : bool
         Expand loops, variables and subprograms into plain lines first: with the interpreter of LinuxCNC, or, for fanuc,
-        with a built-in unroller for those in the same file.
+        with a built-in unroller that supports those in the same file.
     subroutines : list of Path
         Folders of subprograms for --expand; the folder of the program is always searched first.
     unproved : bool
-        Write the program although no interpreter has verified it; its header states this.
+        Write the program even if no interpreter has verified it; its header then says so.
     """
 
     method: Literal["coordinates", "offset"] = "coordinates"
@@ -105,8 +106,8 @@ class Way:
 
     def words(self) -> str:
         """Return the method of correction as text, for the header."""
-        often = f"every {self.every}" if self.every else f"by {self.tolerance}"
-        return f"{self.method}, renewed {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
+        often = f"every {self.every}" if self.every else f"per {self.tolerance} of drift"
+        return f"{self.method}, updated {often}" + (f", steps {self.step}" if self.method == "coordinates" else "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,9 +117,9 @@ class Controller:
     Parameters
     ----------
     controller : str
-        Controller whose NC dialect the program uses: linuxcnc, or fanuc, also for Haas and the ISO programs of most
-        machining centres. Default: linuxcnc, but a Fanuc program, or one that the two would interpret differently, is
-        refused.
+        Controller whose NC dialect the program uses: linuxcnc, or fanuc (also for Haas and the ISO programs of most
+        machining centres). Default: linuxcnc; a Fanuc program, or one that the two controllers would interpret
+        differently, is then refused.
     units : str
         Unit of length in force at the start of the program. Default: none, the program must contain G20 or G21.
     startup : str
@@ -128,8 +129,7 @@ class Controller:
         Spindle speed at the start of the program, such as "6000 1/min". Default: none, the program must contain S and
         M3.
     origin : list of str
-        Origins of the work coordinates, such as "G54=100 mm, 50 mm, 0 mm"; needed where the drift depends on the
-        position.
+        Origins of the work coordinates, such as "G54=100 mm, 50 mm, 0 mm"; needed if the drift depends on the position.
     tool : list of str
         Tool lengths, such as "1=120 mm".
     diameter : list of str
@@ -137,8 +137,8 @@ class Controller:
     home : str
         Position approached by G28, such as "0 mm, 0 mm, 400 mm".
     rotation : list of str
-        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; "none" states that none
-        is stored. They rotate the corrections of X and Y.
+        Rotations of work coordinate systems stored in the controller, such as "G54=12 deg"; "none": no rotation is
+        stored. Stored rotations also rotate the corrections of X and Y.
     no_g92 : bool
         Confirm that no G92 or G52 is in force at the start of the program, nor suspended by G92.2: the method offset
         would erase it.
@@ -148,11 +148,11 @@ class Controller:
     least : str
         Least input increment of the controller.
     block_delete : str
-        Block delete. on: lines that begin with / are not run. off: they may be run or not, and a program whose result
-        depends on this is refused. Required with --expand: off writes them as plain lines.
+        Block-delete switch. on: lines that begin with / are skipped. off: the controller may run or skip them, and a
+        program whose result depends on which is refused. Required with --expand, where off writes them as plain lines.
     harmless : list of str
-        M codes of the machine builder that move no axis and do not change the spindle state, such as M88
-        of a Fanuc or M101 of LinuxCNC.
+        M codes of the machine builder that neither move an axis nor change the spindle state, such as M88 of a Fanuc or
+        M101 of LinuxCNC.
     """
 
     controller: Literal["linuxcnc", "fanuc"] | None = None

@@ -77,7 +77,7 @@ def prepare_job(
         models=models,
         taken=taken,
         start=starting.words(),
-        zero=f"drift counts {starting.counted()}",
+        zero=f"drift relative to {starting.counted()}",
         method=f"method {way.words()}",
         when=_moment(when),
         unproved=way.unproved,

@@ -24,28 +24,29 @@ Zero = Literal["start", "cold", "last"]
 WARMED = 3.0
 
 _COUNTED: dict[Zero, str] = {
-    "start": "from the start of the program",
-    "cold": "from the cold machine",
-    "last": "from the zero of the last job",
+    "start": "the start of the program",
+    "cold": "the cold machine",
+    "last": "the zero of the last job",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drifting:
-    """Inputs that make the tool drift.
+    """Models and inputs of the thermal drift.
 
     Parameters
     ----------
     model : list of Path
         Model files of thermocomp fit (.json).
     axis : list of str
-        Axis corrected by a model, such as ch3=Z, or "zz=X at Z 200 mm" for one of several positions; models that are
-        not listed are ignored. Default: the axes given by names of the targets such as x_um, z or z_at_200.
+        Target of a model and the axis that it corrects, such as ch3=Z, or "zz=X at Z 200 mm" if the target was measured
+        at one of several positions; models that are not listed are ignored. Default: the axes in the names of the
+        targets, such as x_um, z or z_at_200.
     constant : list of str
-        Constant values of model inputs that do not follow from the program, such as "ambient=22 degC".
+        Constant values of model inputs that the program does not determine, such as "ambient=22 degC".
     forecast : Path
-        CSV file with model inputs that do not follow from the program, over the time since its start (columns such as
-        time_min, ambient_C).
+        CSV file with model inputs that the program does not determine, over the time since the start of the program
+        (columns such as time_min, ambient_C).
     accept_unproven : str
         Person who approves the use of unproven models, and the reason: "NAME, REASON".
     """
@@ -123,15 +124,16 @@ class Starting:
     cold : bool
         The machine is cold: it has been at rest for a long time.
     carried : Path
-        State at the end of the last job: the file OUT.job.json of its revision.
+        Thermal state at the end of the last job: the file OUT.job.json that thermocomp revise wrote for it.
     pause : str
         Time since the last job with the spindle stopped, such as "30 min". Default: none.
     measured : list of str
         Measured drift of the tool point relative to the cold machine, such as z=12um.
     zero : str
-        Zero of the drift, that is when the work offsets were set. start: at the start of the program; cold: on the cold
-        machine; last: when those of the last job were set. The default assumes that they have not been changed since
-        the machine was cold, or since the last job: start for --cold, cold for --measured, last for --carried.
+        Zero of the drift: the moment when the work offsets were set. start: at the start of the program; cold: on the
+        cold machine; last: when those of the last job were set. Default: start for --cold, cold for --measured, last
+        for --carried; this assumes that the work offsets have not been changed since the machine was cold, or since the
+        last job.
     """
 
     cold: bool = False
@@ -173,7 +175,7 @@ class Starting:
         """Return the initial thermal state as text, for the header."""
         if self.carried is not None:
             name = self.carried.name
-            return f"{self.pause} after {name}" if self.pause else f"as {name} left it"
+            return f"{self.pause} after {name}" if self.pause else f"state of {name}"
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:

@@ -84,15 +84,15 @@ class Design:
 
 
 #: the design that recovers the law
-OURS = Design("three tests, five runs, counted from the mean state")
+OURS = Design("three tests, five runs, relative to the mean state")
 #: the measurement of the paper, improvements of it, and degradations
 DESIGNS = (
-    Design("one warm-up, one run, counted from the cold state", "chen1996-slope", 1, centred=False),
-    Design("three tests, five runs, counted from the cold state", centred=False),
-    Design("cold state, products only of terms that are in", centred=False, hierarchy=True),
+    Design("one warm-up, one run, relative to the cold state", "chen1996-slope", 1, centred=False),
+    Design("three tests, five runs, relative to the cold state", centred=False),
+    Design("relative to the cold state, products only of terms already in the model", centred=False, hierarchy=True),
     OURS,
-    Design("mean state, four times the noise of the laser", laser=4 * LASER),
-    Design("mean state, four times the noise of the sensors", sensor=4 * SENSOR),
+    Design("relative to the mean state, four times the laser noise", laser=4 * LASER),
+    Design("relative to the mean state, four times the sensor noise", sensor=4 * SENSOR),
 )
 
 

@@ -53,29 +53,29 @@ def papers(
     overwrite: bool = False,
     json: bool = False,
 ) -> int:
-    """Reproduce the papers' studies on the virtual machine: their numbers, ours, and whether their claims hold.
+    """Reproduce the studies of five papers on the virtual machine: their numbers, ours, and whether their claims hold.
 
     A claim that does not hold is a result, not an error.
 
     Parameters
     ----------
     names : list of str
-        Papers to reproduce; cross is the table of methods on all experiments. Default: all five papers.
+        Papers to reproduce; cross: a table of the methods on all experiments. Default: all five papers.
     measured : list of Path
         Measured recordings on which the methods of cross are judged as well; each one is a separate test.
     mapping : Path
         TOML mapping file: role and unit of each column of the measured recordings.
     target : list of str
-        Displacements of the measured recordings that cross judges. Default: all of them.
+        Displacement channels of the measured recordings on which cross judges the methods. Default: all of them.
     models : list of str
         Methods of cross, or "all". Default: those that run within seconds.
     physics : {'linear', 'nonlinear'}
-        Physics of the virtual machine for wessel2004: linear, or nonlinear with joints, bearings and films that depend
-        on temperature and speed.
+        Physics of the virtual machine for wessel2004: linear, or nonlinear: joints, bearings and convection depend on
+        temperature and speed.
     seed : int
-        Random seed of the weather, the sensor noise and random draws.
+        Random seed of the weather, the sensor noise and all other random draws.
     repeats : int
-        Number of runs of each paper's study, with seeds 100 apart: claims that hold in only some runs are marked.
+        Number of runs of each paper's study, with seeds 100 apart: claims that hold in some runs only are marked.
         Numbers and figures are those of the first run.
     jobs : int
         Number of parallel processes for the runs or the methods of cross; -1: one per core.

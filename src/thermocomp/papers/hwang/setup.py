@@ -156,7 +156,7 @@ class Computed:
         """Residuals of each model in the new tests [um]."""
         z = self.new.deviations[:, 0]
         left = {name: z - common.predict_deviation(f.model, self.new) for name, f in self.fits.items()}
-        return {NONE: z} | left | {"dynamic (not of the paper)": self.dynamic}
+        return {NONE: z} | left | {"dynamic (not in the paper)": self.dynamic}
 
     @cached_property
     def errors(self) -> dict[str, common.Errors]:

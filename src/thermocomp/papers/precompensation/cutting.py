@@ -30,9 +30,9 @@ OFTEN = 20.0
 COLD, WARM, WARMER, COLDER = "cold", "warm", "warmer", "colder"
 #: cases: true state, and state assumed by the revision; warm: after a run of `BEFORE`
 RIGHT = "cold"
-UNKNOWN = "warm, taken for cold"
-CARRIED = "warm, carried over"
-FALSE = "cold, taken for warm"
+UNKNOWN = "warm, assumed to be cold"
+CARRIED = "warm, state carried over"
+FALSE = "cold, assumed to be warm"
 WARMS, COOLS = f"the room warms by {ROOM:g} degC", f"the room cools by {ROOM:g} degC"
 #: true state of each case, and whether the revision assumes a warm start
 CASES: Mapping[str, tuple[str, bool]] = {

@@ -52,7 +52,7 @@ STEP = 1.0
 #: change of the drift at which a correction is renewed [um], as in ``thermocomp revise``
 TOLERANCE = 1.0
 #: revision methods: as in the paper, as soon as needed, and at safe points only
-EVERY, NEEDED, SAFE = "every 10 min", f"by {TOLERANCE:g} um", f"work offset, by {TOLERANCE:g} um"
+EVERY, NEEDED, SAFE = "every 10 min", f"per {TOLERANCE:g} um", f"work offset, per {TOLERANCE:g} um"
 WAYS = (EVERY, NEEDED, SAFE)
 
 

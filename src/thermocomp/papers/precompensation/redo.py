@@ -115,7 +115,7 @@ def _figures(c: Computed) -> tuple[Figure, ...]:
     )
     added = {"drift": z[:, 0], "added to the program": c.schedule[:, 0], "left": z[:, 0] + c.schedule[:, 0]}
     without, with_ = np.array([k.means for k in c.cuts]).T
-    warm = {"drift": c.warm.drift, "left, begun cold": c.warm.cold, "left, carried over": c.warm.carried}
+    warm = {"drift": c.warm.drift, "residual, cold start": c.warm.cold, "residual, state carried over": c.warm.carried}
     return (
         exhibits.figure("precompensation-fig4", (hours, first), (hours, last)),
         exhibits.figure("precompensation-schedule", (hours, added)),

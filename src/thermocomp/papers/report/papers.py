@@ -39,7 +39,7 @@ def headline(study: Study) -> str:
         line += f" in each of {runs} runs"
     if n["some"]:
         line += f", {n['some']} in some of them"
-    return f"{line}; {n['-']} more number{'s' if n['-'] > 1 else ''} beside the paper's" if n["-"] else line
+    return f"{line}; {n['-']} more number{'s' if n['-'] > 1 else ''} next to the paper's" if n["-"] else line
 
 
 def text(study: Study, *ids: str) -> str:

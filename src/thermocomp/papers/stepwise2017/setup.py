@@ -29,7 +29,7 @@ METHODS = {
     "projection pursuit": "ppr",
     "principal components": "pcr",
     "sliced inverse regression": "",
-    "dynamic (not of the paper)": "dynamic",
+    "dynamic (not in the paper)": "dynamic",
 }
 STEPWISE, LEAST, PURSUIT, COMPONENTS, SLICED, DYNAMIC = METHODS
 NONE = "no compensation"

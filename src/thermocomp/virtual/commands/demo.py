@@ -21,7 +21,7 @@ def demo(
     output : Path
         Output folder for recording, model and report.
     seed : int
-        Random seed of weather and noise.
+        Random seed of the weather and the noise.
     overwrite : bool
         Overwrite the files of an earlier run.
     json : bool

@@ -78,6 +78,6 @@ def _show_experiments(experiments: list[Experiment]) -> None:
     columns = (
         Column("experiment", lambda e: e.name),
         Column("tests", lambda e: len(e.tests), ">"),
-        Column("what it is", lambda e: e.description),
+        Column("description", lambda e: e.description),
     )
     print_table(Layout(columns, experiments), console, box=None)

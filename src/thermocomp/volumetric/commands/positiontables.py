@@ -52,14 +52,14 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
                 ">",
             ),
             Column("terms", lambda t: t.n_terms, ">"),
-            Column("left out", lambda t: f"{t.left_out:.3f}", ">", unit),
+            Column("error", lambda t: f"{t.left_out:.3f}", ">", unit),
         )
-        title = "Cold profile: error at points left out"
+        title = "Cold profile: cross-validation error at left-out points"
         print_table(Layout(columns, fit.profile.tried, title, caption="! = chosen"), console)
     kind = f"{model.profile and model.profile.kind} of order {_order(fit.profile.order)}"
     console.print(f"Cold profile: {words('natural spline through all points' if fit.profile.through else kind)}")
     if fit.profile.words:
-        console.print(f"[yellow]but[/] it {words(fit.profile.words)}")
+        console.print(f"[yellow]but[/] the cold profile {words(fit.profile.words)}")
     if left_open:
         console.print(f"Determined from the profiles: {words(_chosen(found, left_open))}")
     for factor, errors, power in zip(model.models, fit.coefficient_errors, model.powers, strict=True):
@@ -70,20 +70,23 @@ def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Se
             console.print(words(f"  standard errors: {told}"))
     rest = ", ".join(f"m = {m}: {r:.2f}" for m, r in fit.remainders.items() if math.isfinite(r))
     console.print(
-        f"Residual of the cold profile {fit.thermal_rms:.2f} {unit} RMS; with powers up to {words(rest)} {unit}"
+        f"Residual of the cold profile alone: {fit.thermal_rms:.2f} {unit} RMS; with powers of the position up to "
+        f"{words(rest)} {unit}"
     )
     if model.powers and "slopes" not in left_open and fit.enough > max(model.powers):
-        console.print(f"[yellow]but[/] higher powers describe more: try --slopes {fit.enough}")
+        console.print(f"[yellow]but[/] higher powers leave a smaller residual: try --slopes {fit.enough}")
     if model.slopes and "offset" not in left_open and fit.shifts:
         console.print(
-            f"[yellow]but[/] the profiles do not turn about {model.reference_position:g} mm: with an offset "
-            f"{fit.offset_remainder:.2f} {unit} remain; try --offset, or another --reference-position"
+            f"[yellow]but[/] the profiles do not tilt about {model.reference_position:g} mm: with an offset the "
+            f"residual is {fit.offset_remainder:.2f} {unit}; try --offset, or another --reference-position"
         )
     _show_judging(found, left_open, console)
     print_table(_cycle_table(found), console)
     console.print(f"{marked(_verdict(found))} {words(model.target)}: {words(judged.reason)}")
     if found.dropped:
-        console.print(f"[yellow]but[/] the cold profile alone; its thermal part is left out: {words(found.dropped)}")
+        console.print(
+            f"[yellow]but[/] only the cold profile is used; its thermal part is omitted: {words(found.dropped)}"
+        )
 
 
 def show_all(
@@ -97,9 +100,9 @@ def show_all(
     states = sum(len(t) for t in tests[0])
     console.print(f"{len(found)} components, {states} profiles of each in {len(tests[0])} recording(s)")
     caption = (
-        "order: of the cold profile; factors: k0 shift, k1 slope, k2 ..., of positions counted from 'at'; "
-        "RMS over all points of unseen profiles, um or urad: without compensation, less the cold profile, less the "
-        "model; profile: the cold profile alone is used"
+        "order: order of the cold profile; factors: k0 shift, k1 slope, k2 ..., for positions relative to 'at'; none, "
+        "cold, model: RMS over all points of unseen profiles (um or urad) without compensation, with the cold "
+        "profile, and with the model; verdict profile: only the cold profile is used"
     )
     columns = (
         Column("", lambda f: f"{f.fit.model.target}, {f.fit.model.unit}", whole=True),
@@ -121,7 +124,8 @@ def show_all(
             )
         elif f.dropped:
             console.print(
-                f"[yellow]cold profile alone[/] {words(f.fit.model.target)}: thermal part: {words(f.dropped)}"
+                f"[yellow]cold profile only[/] {words(f.fit.model.target)}: the thermal part is omitted: "
+                f"{words(f.dropped)}"
             )
 
 
@@ -132,7 +136,7 @@ def _show_notes(tests: Sequence[Sequence[Profiles]], console: Console) -> None:
 
 
 def _show_judging(found: PositionStudy, left_open: Sequence[Setting], console: Console) -> None:
-    again = "; settings are chosen again in each" if left_open else ""
+    again = "; settings are selected again in each fold" if left_open else ""
     console.print(f"Judged on: {words(found.assessment.protocol)}{again}")
 
 
@@ -176,7 +180,7 @@ def _shortened(formula: str) -> str:
         return formula
     cut = max(formula.rfind(" + ", 0, FORMULA), formula.rfind(" - ", 0, FORMULA))
     more = formula[cut:].count(" + ") + formula[cut:].count(" - ")
-    return f"{formula[:cut]} ... and {more} terms more (--json has them)"
+    return f"{formula[:cut]} ... and {more} more terms (see --json)"
 
 
 def _verdict(found: PositionStudy, alone: str = "cold profile") -> Toned:

@@ -37,7 +37,7 @@ def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
 def _show(found: VolumetricErrors, page: Path | None) -> None:
     study, point, volume = found.study, found.point, found.volume
     machine, recording = study.machine, study.recording
-    replayed = "reference state: constants and profiles alone"
+    replayed = "reference state, with constants and profiles only"
     if recording is not None:
         hours = (recording.time[-1] - recording.time[0]) / 3600
         replayed = f"{recording.source or recording.name}, {len(recording)} rows, {hours:.2f} h"
@@ -51,7 +51,10 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
     )
     console.print(", ".join(others), soft_wrap=True)
     if point:
-        console.print(f"\n[bold]At {told.said(study.course.point)}[/], the tip at {told.said(study.course.tool)}")
+        console.print(
+            f"\n[bold]At {told.said(study.course.point)}[/], tool tip at {told.said(study.course.tool)} from "
+            "the gauge point"
+        )
         print_table(told.at_point(study), console)
     print_table(told.contributions(study, point=point), console)
     print_table(told.lines(study), console)
@@ -61,7 +64,7 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         if codes:
             console.print(f"[yellow]but[/] {what}: {words(', '.join(codes))}", soft_wrap=True)
     if study.missing:
-        console.print(f"[yellow]but[/] in {study.missing} rows an input is missing: the previous state is held there")
+        console.print(f"[yellow]but[/] an input is missing in {study.missing} rows, where the previous state is held")
     for note in study.notes:
         console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
     if volume:

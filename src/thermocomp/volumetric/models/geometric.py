@@ -93,7 +93,8 @@ class ProfileFit:
         """Return cautions about the fit of the profile, as text; empty if there are none."""
         if self.leaves_more:
             return (
-                f"leaves {self.rms:.3g} where repeated values differ by {self.noise:.3g}: it misses part of the shape"
+                f"leaves a residual of {self.rms:.3g}, but repeated values differ only by {self.noise:.3g}: it misses "
+                "part of the shape"
             )
         return ""
 

@@ -22,7 +22,7 @@ def render(study: Volumetric) -> str:
         ),
         replayed=(recording.source or recording.name) if recording is not None else "reference state",
         n_points=study.moments[0].grid.size // 3,
-        tool=f"the tool's tip at {tables.said(course.tool)} from the gauge point",
+        tool=f"the tool tip at {tables.said(course.tool)} from the gauge point",
         point=tables.said(course.point),
         volume=tables.volume(study),
         at=tables.at_point(study, page=True),

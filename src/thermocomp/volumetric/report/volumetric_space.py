@@ -55,7 +55,7 @@ def boxes(study: Volumetric) -> str:
             for row, (title, error, size) in enumerate(
                 (
                     (moment.name, moment.error, moment.straight.before),
-                    ("after the straight lines", moment.after_lines, moment.straight.after),
+                    ("corrected by straight lines", moment.after_lines, moment.straight.after),
                 )
             ):
                 ax = axes[row, column]
@@ -103,7 +103,7 @@ def sections(study: Volumetric, moment: Moment) -> str:
             for ax, plane, error, (first, second, u, v, _, _) in zip(panels, planes, found, drawn, strict=True):
                 arrows = _section(ax, error, (u, v), (first, second), key / (0.18 * min(min(s) for s in spans)), levels)
                 ax.set_ylabel(f"{plane[1]} [mm]")
-                ax.set_title("after the straight lines" if row else _plane_named(study, plane))
+                ax.set_title("corrected by straight lines" if row else _plane_named(study, plane))
                 if row or len(planes) == 1:
                     ax.set_xlabel(f"{plane[0]} [mm]")
             mappable, shrink = ScalarMappable(norm, MAGNITUDE), 1.0 if len(planes) > 1 else 0.7
@@ -265,7 +265,7 @@ def _scale(ax: Axes, study: Volumetric, magnified: float, largest: float) -> Non
     ax.text(
         x + length + 0.03 * float(np.ptp(corners[:, 0])),
         y,
-        f"{size:g} um of error: drawn {magnified:,.0f} times as large",
+        f"{size:g} um of error, magnified {magnified:,.0f} times",
         va="center",
         fontsize=8,
     )

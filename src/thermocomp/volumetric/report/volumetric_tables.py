@@ -24,9 +24,9 @@ def headline(study: Volumetric) -> str:
     when = f"after {study.worst.time / 3600:.2f} h" if len(study.course.time) > 1 else "in the reference state"
     left = f"{everything.largest:.2f}" if everything.largest >= SETTLED else f"less than {SETTLED:g}"
     return (
-        f"Largest error in the work volume {none.largest:.1f} um, RMS {none.rms:.1f} um, {when}; after the best "
-        f"straight line of each axis {lines.largest:.1f} um, RMS {lines.rms:.1f} um; after a correction "
-        f"computed for every point {left} um"
+        f"Largest error in the work volume {when}: {none.largest:.1f} um (RMS {none.rms:.1f} um); with a correction by "
+        f"the best straight line of each axis: {lines.largest:.1f} um (RMS {lines.rms:.1f} um); with a correction "
+        f"computed for every point: {left} um"
     )
 
 
@@ -45,12 +45,12 @@ def components(study: Volumetric, *, page: bool = False) -> Layout:
 
     columns = (
         Column("component" if page else "", "code", whole=True),
-        *((Column("what", "description"),) if page else ()),
-        Column("told by", "source", whole=True),
+        *((Column("description", "description"),) if page else ()),
+        Column("source", "source", whole=True),
         *map(value, range(len(study.moments))),
         Column("unit", "unit") if page else Column("", "unit", whole=True),
     )
-    return Layout(columns, rows, caption=f"components at {said(study.course.point)}", tones=nothing)
+    return Layout(columns, rows, caption=f"error components at {said(study.course.point)}", tones=nothing)
 
 
 def at_point(study: Volumetric, *, page: bool = False) -> Layout:
@@ -86,7 +86,9 @@ def contributions(study: Volumetric, *, point: bool) -> Layout:
         Column("volume", "volume_rms_um", "um", whole=True),
     )
     told = [c for c in found[:TOLD] if max(c["length_um"], c["volume_rms_um"]) > 0]
-    return Layout(columns, told, caption=f"what the components add (um); volume: RMS over it; {moment.name}")
+    return Layout(
+        columns, told, caption=f"contributions of the components (um), {moment.name}; volume: RMS in the work volume"
+    )
 
 
 def lines(study: Volumetric, *, page: bool = False) -> Layout:
@@ -105,16 +107,17 @@ def lines(study: Volumetric, *, page: bool = False) -> Layout:
     if page:
         columns += [
             Column("reference position", "reference_position_mm", "um", "mm"),
-            Column("residual along it, largest", "left_along_max_um", "um", "um"),
-            Column("residual in the volume, RMS", "left_volume_rms_um", "um", "um"),
-            Column("largest", "left_volume_max_um", "um", "um"),
+            Column("largest residual along the line", "left_along_max_um", "um", "um"),
+            Column("RMS residual in the volume", "left_volume_rms_um", "um", "um"),
+            Column("largest in the volume", "left_volume_max_um", "um", "um"),
         ]
     else:
         columns += [
             Column("at", "reference_position_mm", "g", "mm", whole=True),
             Column("left", "left_along_max_um", "um", "um", whole=True),
         ]
-    return Layout(columns, rows, caption="best straight lines: correction = offset + slope x (position - at)")
+    caption = "best straight lines: correction = offset + slope x (position - reference position)"
+    return Layout(columns, rows, caption=caption + ("" if page else "; at: reference position; left: largest residual"))
 
 
 def volume(study: Volumetric) -> Layout:
@@ -126,7 +129,7 @@ def volume(study: Volumetric) -> Layout:
     ]
     columns = (
         Column("thermal state", 0),
-        Column("corrected", 1),
+        Column("correction", 1),
         Column("RMS", 2, "um", "um"),
         Column("largest", 3, "um", "um"),
     )

@@ -90,7 +90,7 @@ def prepare(path: Path, folder: Path, settings: HalSettings) -> HalSetup:
         raise InputError(f"{folder}: HAL and a socket need a short path without spaces: choose another folder with -o")
     todo: list[str] = []
     joints = round(ini.number("KINS", "JOINTS"))
-    lines = ["# written by thermocomp linuxcnc setup; write it again rather than change it"]
+    lines = ["# written by thermocomp linuxcnc setup; do not edit, run setup again instead"]
     lines += haltext.load_modules(axes, joints, settings.pattern, files, todo)
     lines += haltext.make_gate(joints, settings.pattern, files)
     inch = ini.get("TRAJ", "LINEAR_UNITS", "mm").lower() in ("in", "inch", "imperial")

@@ -66,7 +66,7 @@ function drawResiduals(state) {
   const series = names.map((label, k) => ({ label, stroke: TINTS[k % TINTS.length], width: 0, paths: () => null, points: { show: true, size: 9, fill: TINTS[k % TINTS.length] } }));
   const limit = label => ({ label, stroke: css("--bad"), dash: [5, 5], points: { show: false } });
   draw("residuals", at(document, "#residuals"), [...series, limit("action limit"), limit("action limit, lower")],
-    [time, ...names.map(n => found.map(r => r.target === n && r.limit ? r.residual / r.limit : null)), found.map(() => 1), found.map(() => -1)], [], "share of the action limit", true);
+    [time, ...names.map(n => found.map(r => r.target === n && r.limit ? r.residual / r.limit : null)), found.map(() => 1), found.map(() => -1)], [], "residual / action limit", true);
 }
 
 function table(id, rows) {
@@ -86,7 +86,7 @@ function table(id, rows) {
 }
 
 function show(state) {
-  put(at(document, "#clock"), "machine " + clock(state.time) + (state.speed === 1 ? "" : `, ${state.speed} times as fast`));
+  put(at(document, "#clock"), "machine " + clock(state.time) + (state.speed === 1 ? "" : `, at ${state.speed} times real time`));
   const silent = at(document, "#alarm"), bad = state.links.filter(l => l.state === "failed");
   const failed = state.sensors.filter(s => s.state !== "good").map(s => `${s.name} ${s.state}`).concat(state.missing.map(n => n + " missing"));
   const alarms = [...failed, ...bad.map(l => l.name + ": " + l.reason)];
@@ -104,7 +104,7 @@ function show(state) {
   }
   table("#sensors", state.sensors.map(s => [s.name, s.value.toFixed(2), [s.state, s.state === "good" ? "active" : "failed"]])
     .concat(state.missing.map(n => [n, "–", ["missing", "failed"]])));
-  put(at(document, "#others"), state.left_out ? `and ${state.left_out}${state.left_out < 10000 ? "" : " or"} more names that no model uses` : "");
+  put(at(document, "#others"), state.left_out ? `and ${state.left_out}${state.left_out < 10000 ? "" : " or"} more channels that no model uses` : "");
   table("#links", state.links.map(l => [l.name, [l.state, l.state], l.reason]));
   put(at(document, "#counts"), `${state.counts.readings} readings, ${state.counts.rejected} of them rejected${state.rejected ? ": " + state.rejected : ""}`);
   table("#events", state.events.slice(0, 100).map(e => [clock(e.time), e.kind, e.text]));
@@ -131,7 +131,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", restyle);
 addEventListener("resize", () => {
   for (const c of charts.values()) if (c.node.clientWidth !== c.plot.width) c.plot.setSize({ width: Math.max(260, c.node.clientWidth), height: c.plot.height });
 });
-setInterval(() => { if (heard && Date.now() - heard > 5000) { const a = at(document, "#alarm"); a.hidden = false; put(a, "the service does not answer: what is shown is old"); } }, 1000);
+setInterval(() => { if (heard && Date.now() - heard > 5000) { const a = at(document, "#alarm"); a.hidden = false; put(a, "the service does not respond: the values shown are old"); } }, 1000);
 
 fetch("/api/curves").then(r => r.json()).then(found => {
   if (found.time) curves = found;

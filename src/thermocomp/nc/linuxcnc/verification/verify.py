@@ -147,8 +147,8 @@ def foresee_sentence(setup: Setup) -> str:
 def _say_states(count: int, held: Sequence[str], drawn: Sequence[str]) -> str:
     named = (f"{name} (in half of them)" if name in states.HALF else name for name in drawn)
     return (
-        f"in {count} controller states; the same in all: {', '.join(('what the program specifies', *held))}; "
-        f"not the same: {', '.join(named)}"
+        f"in {count} controller states; equal in all: {', '.join(('what the program specifies', *held))}; "
+        f"varied: {', '.join(named)}"
     )
 
 
