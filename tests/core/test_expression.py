@@ -81,6 +81,7 @@ def test_a_run_is_its_steps(
     )
     np.testing.assert_array_equal(np.concatenate([r.outside for r in runs]), [s.outside for s in expected])
     assert state.memory is not None
+    assert runs[-1].state.memory is not None
     np.testing.assert_allclose(runs[-1].state.memory, state.memory, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(runs[-1].state.reference, state.reference)
 
