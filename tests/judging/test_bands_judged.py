@@ -174,7 +174,7 @@ def test_who_fits_and_assesses_is_told(samples: Samples, capsys: pytest.CaptureF
 def test_the_words_of_a_band_give_the_half_widths_where_structures_agree() -> None:
     band = Band(0.9, "assumption", 4, 1.5, 2.0, 3.0, (1,))
     assert band.tell("um") == (
-        "90 % band by assumption, 4 cycles: half-width at least 4.50 um at rest and 3.00 um running, "
+        "90 % band by assumption, 4 cycles: half-width at least 4.50 um at rest and 3.00 um with the spindle running, "
         "more where the averaged models disagree"
     )
-    assert "4.50 um at rest and 4.50 um running" in replace(band, speeds=()).tell("um")
+    assert "4.50 um at rest and 4.50 um with the spindle running" in replace(band, speeds=()).tell("um")

@@ -212,7 +212,7 @@ def test_the_failures_are_told(model: ErrorModel) -> None:
     logs = find_faults(assessing.assess([model], [recording], starts=Start()), [recording])
     first, second = describe_faults(logs, [recording])
     assert first.startswith("failing: t1_C stepped from 4.")
-    assert " to the end; it read +" in first
+    assert " to the end; its reading minus its substitute value was +" in first
     assert second == "failing: t2_C missing from 6.00 h to the end"
 
 
