@@ -317,6 +317,31 @@ def test_habits_answer_for_lengths_only() -> None:
     assert question(f"{BEGIN}{arc}G2 X0 Y0 I-5 J0.\n{END}") == ""
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        ";O0042 - FLANGE",
+        "; O1234 BRACKET",
+        "; PROGRAM O1234",
+        "%\n; O 1234 - side 2",
+        "; job :1234 of today",
+        "; finishing\n; see O77",
+        "; the plate\n(POST: FANUC 0i)",
+        "; haas vf2",
+    ],
+)
+def test_text_behind_a_semicolon_with_a_program_number_or_another_control_is_no_habit_of_linuxcnc(text: str) -> None:
+    assert "X100 is 100 mm" in question(f"{text}\n{BEGIN}X100\n{END}")
+    assert question(f"{text}\n(MSG, ready)\n{BEGIN}X100\n{END}") == ""
+
+
+@pytest.mark.parametrize(
+    "text", ["; go to X1", "; OP10 roughing", "; 10:30 o'clock", "; ratio 1:2", "; #O1", "; NO1 mill"]
+)
+def test_other_text_behind_a_semicolon_is(text: str) -> None:
+    assert question(f"{text}\n{BEGIN}X100\n{END}") == ""
+
+
 def test_habits_answer_for_a_radius_and_stored_codes_but_not_for_the_makers_codes() -> None:
     comment = f"; the plate\n{BEGIN}"
     assert question(f"{comment}G8\nM70\nM72\n{END}") == ""

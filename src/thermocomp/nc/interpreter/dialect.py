@@ -1,8 +1,8 @@
 """Detection of the dialect of a whole program (LinuxCNC or Fanuc); ambiguous programs are refused.
 
 A *sign* is something that one of the two controls refuses: it is conclusive. A *hint* is a habit of LinuxCNC users:
-text after ``;`` (programs for Fanuc controls end lines with a bare ``;``), a comment that LinuxCNC executes or that
-names LinuxCNC, arcs in several lines that close only if lengths without a decimal point are whole units. It decides
+text after ``;`` (programs for Fanuc controls end lines with a bare ``;``), unless such a text or a comment has a program
+number or names another control; a comment that LinuxCNC executes or that names LinuxCNC; arcs in several lines that close only if lengths without a decimal point are whole units. It decides
 the meaning of such lengths and of a few other words (`_USUAL`). Signs and hints count before the end of the program:
 LinuxCNC reads nothing after M2, M30 or a closing ``%``, but a Fanuc may. All words that both accept but interpret
 differently (`thermocomp.nc.interpreter.openwords`) are refused for clarification, unless there is a sign of
@@ -33,6 +33,8 @@ _BARE = re.compile(r"[XYZIJKABCR][-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).s
 # all other lines, without comments and blanks, in upper case, with {} for brackets
 _COMMENT = re.compile(r"\([^()]*\)?")
 _ACTIVE = re.compile(r"\([ \t]*(?:MSG|DEBUG|PRINT|LOG|LOGOPEN|PROBEOPEN)[ \t]*,|LINUXCNC")
+_OTHERS = re.compile(r"\b(?:FANUC|HAAS|MAZAK|MITSUBISHI|BROTHER|OKUMA|SIEMENS|SINUMERIK|HEIDENHAIN|FAGOR)\b")
+_NUMBER_IN_TEXT = re.compile(r"(?<![A-Z0-9#<.])[O:][ \t]*[0-9]{1,8}(?![0-9.])")
 _MARKS = ("\ufeff", "ï»¿")
 _BRACKET = re.compile(r"\[[^\[\]]*\]")
 _HEAD = re.compile(r"(?P<delete>/[1-9]?)?(?:N[0-9]+(?:\.[0-9]+)?)?(?P<again>/[1-9]?)?")
@@ -145,6 +147,7 @@ def judge_dialect(lines: Iterable[str], *, whole: bool = False, startup: str = "
         if not scan.pass_plain(text):
             scan.take(number, text)
     found = scan.found
+    found.hint = scan.hint
     for kind, shown in DOUBTS.items():
         if getattr(scan.force, shown):
             found.open.pop(kind, None)
@@ -161,6 +164,8 @@ class _Scan:
         self.found = Judgement()
         self.force = force
         self._began = self._ended = False
+        self._commented: Place | None = None  # first text behind ";"
+        self._foreign = False  # such a text has a program number, or a comment names another control
         self._line = 0
         self._whole = self._text = self._code = ""
 
@@ -187,18 +192,26 @@ class _Scan:
         text = text.upper()
         if _ACTIVE.search(text):
             self._hint("a comment for LinuxCNC")
+        self._foreign |= _OTHERS.search(text) is not None
         self._code, *rest = _COMMENT.sub(" ", text).split(";")
         block = _squeeze(self._code)
         self._ended = self._ended or (block == "%" and self._began)
         self._began = self._began or bool(block)
         self._block(block)
-        for behind in map(_squeeze, rest):
+        for behind, written in zip(map(_squeeze, rest), rest, strict=True):
             if _NUMBER_ALONE.fullmatch(behind):
                 self._sign("fanuc", _BEGINS)
             elif _WORDS.fullmatch(behind) and not self._ended:
                 self._ask("behind", f"';{behind[:20]}'", _BEHIND)
             elif behind:
-                self._hint("a comment of LinuxCNC's")
+                self._foreign |= _NUMBER_IN_TEXT.search(written) is not None
+                if not self._ended:
+                    self._commented = self._commented or Place(self._line, self._text, "a comment of LinuxCNC's")
+
+    @property
+    def hint(self) -> Place | None:
+        """First hint of LinuxCNC in the whole program."""
+        return self.found.hint or (None if self._foreign else self._commented)
 
     def _sign(self, whose: Whose, what: str) -> None:
         if getattr(self.found, whose) is None and (whose == "fanuc" or not self._ended):
