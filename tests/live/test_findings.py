@@ -175,6 +175,9 @@ def faults(path: Path) -> list[str]:
         ('file = "day.csv"', 'file = "broken.csv"', "broken.csv: line 3 cannot be read"),
         ('token_file = "token.txt"', 'token_file = "short.txt"', "short.txt: the token has only 5 characters"),
         ('token_file = "token.txt"', 'token_file = "missing.txt"', "missing.txt: no such file"),
+        ('state = "state.json"', 'state = "/proc/state.json"', "no file can be created in the folder /proc"),
+        ('token_file = "token.txt"', 'token_file = "two.txt"', "two.txt: expected one token in one line"),
+        ('token_file = "token.txt"', 'token_file = "."', "this is a folder; name a file"),
         ("port = 0", 'host = "203.0.113.7"', "page on 203.0.113.7"),
         ("port = 0", 'host = "nowhere.invalid"', "page on nowhere.invalid"),
         ('kind = "file"\nfile = "out.json"', 'kind = "linuxcnc"\nsocket = "s.sock"\naxes = {z_um = "Z"}', "not set up"),
@@ -194,6 +197,7 @@ def test_what_is_there_and_what_is_not(old: str, new: str, says: str, tmp_path: 
     path = lay(tmp_path, GOOD.replace(old, new))
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "short.txt").write_text("short", encoding="ascii")
+    (tmp_path / "two.txt").write_text("0123456789abcdef\nfedcba9876543210\n", encoding="ascii")
     (tmp_path / "broken.csv").write_bytes(b"time_s,t1_C\n0,20\n1,\xff\n")
     found = faults(path)
     assert any(says in line for line in found), found

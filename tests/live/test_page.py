@@ -174,7 +174,17 @@ def test_an_implausible_one_is_refused_and_asks_for_action() -> None:
     assert any("look for the cause" in e.text for e in service.events)
 
 
-@pytest.mark.parametrize("content", ["", "short", "not ascii é 0123456789"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "short",
+        "not ascii é 0123456789",
+        "0123456789abcdef\n0123456789abcdef\n",
+        "0123456789 abcdef",
+        "0123456789\tabcdef",
+    ],
+)
 def test_a_token_that_is_none_is_refused(content: str, tmp_path: Path) -> None:
     path = tmp_path / "token"
     path.write_text(content, encoding="utf-8")

@@ -2,6 +2,7 @@
 
 import os
 import re
+import tempfile
 from collections import Counter, deque
 from collections.abc import Iterator
 from pathlib import Path
@@ -92,7 +93,7 @@ def runs_now(settings: ServiceSettings) -> bool:
 
 def _unreadable(path: Path, *, recording: bool) -> str:
     if not path.is_file():
-        return "no such file"
+        return "this is a folder; name a file" if path.is_dir() else "no such file"
     if not os.access(path, os.R_OK):
         return "this user has no permission to read the file"
     try:
@@ -110,8 +111,11 @@ def _unwritable(path: Path) -> str:
         return f"this is {'a folder' if path.is_dir() else 'a pipe or a device'}; name a file"
     if not path.parent.is_dir():
         return f"there is no folder {path.parent}"
-    if not os.access(path.parent, os.W_OK):
-        return f"the folder {path.parent} is not writable"
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as e:
+        return f"no file can be created in the folder {path.parent}: {e.strerror}"
     return "the file is read-only" if path.exists() and not os.access(path, os.W_OK) else ""
 
 

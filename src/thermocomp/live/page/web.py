@@ -43,7 +43,7 @@ class _Server(uvicorn.Server):
 
 
 def read_token(path: Path) -> str:
-    """Return the token in a file, or raise an error if it is missing or too short."""
+    """Return the token in a file, or raise an error if it is missing, too short, or cannot be sent."""
     try:
         token = path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError) as e:
@@ -52,6 +52,10 @@ def read_token(path: Path) -> str:
         raise InputError(
             f"{path}: the token has only {len(token)} characters; expected at least {SHORTEST}, for example from "
             "'openssl rand -hex 16'"
+        )
+    if not token.isprintable() or " " in token:
+        raise InputError(
+            f"{path}: expected one token in one line, without blanks or control characters: a browser cannot send others"
         )
     return token
 
