@@ -290,15 +290,16 @@ def test_the_zero_is_the_mean_of_the_first_minutes_at_rest() -> None:
         last = time
         if k >= 20:
             assert found[k][1] == -float(deviation)
-    assert all(not s.gathered[0].times for s, _ in found[20:])
+    assert all(s.averaged[0].count == 3 for s, _ in found[2:20])
+    assert all(not s.averaged[0].count for s, _ in found[20:])
 
 
 def test_the_zero_ends_where_the_spindle_starts() -> None:
     rows = [(15.0 * k, 20.0 + 0.1 * (k % 2), 0.0) for k in range(4)] + [(15.0 * k, 30.0, 3000.0) for k in range(4, 9)]
     found = live([replace(model(), zeroing=AVERAGING)], rows)
     assert [offset for _, offset in found[:4]] == [0.0] * 4
-    assert found[4][0].models[0].reference[0] == pytest.approx(20.05)
-    assert found[4][1] == pytest.approx(-2 * 9.95 - 0.01 * 3000 * -math.expm1(-15 / 600))
+    assert found[4][0].models[0].reference[0] == pytest.approx(20.0 + 0.1 / 3)  # medians: 20.0 for 30 s, 20.1 for 15 s
+    assert found[4][1] == pytest.approx(-2 * (10.0 - 0.1 / 3) - 0.01 * 3000 * -math.expm1(-15 / 600))
 
 
 def test_a_spindle_that_turns_from_the_first_reading_keeps_the_zero_short() -> None:
@@ -306,7 +307,7 @@ def test_a_spindle_that_turns_from_the_first_reading_keeps_the_zero_short() -> N
     for n, speed in ((3000.0, "n"), (0.0, "")):  # it turns; or nothing says that it stands
         zeroing = Zeroing(300.0, 10.0, speed)
         found = live([replace(model(), zeroing=zeroing)], [(2.0 * k, 20.0 + 0.02 * k, n) for k in range(20)])
-        assert found[5][0].models[0].reference[0] == pytest.approx(20.05)
+        assert found[5][0].models[0].reference[0] == pytest.approx(20.044)  # medians: 20.02 for 4 s, then 2 s each
         assert found[4][1] == 0.0
     once_a_minute = live([replace(model(), zeroing=AVERAGING)], [(60.0 * k, 20.0 + k, 3000.0) for k in range(3)])
     assert once_a_minute[1][0].models[0].reference[0] == 20.0

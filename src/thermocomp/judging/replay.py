@@ -10,7 +10,7 @@ from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
-from thermocomp.core.zero import Zeroing, first_rows, robust_mean
+from thermocomp.core.zero import Zeroing, first_rows, mean_over_time
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
 from thermocomp.recordings.recording import Recording
@@ -191,7 +191,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
                 last = samples.time[k]
             if shift is None and k in window:
                 there.append(state.deviation)
-                shift = np.mean(there, axis=0) if k == window[-1] else None
+                shift = mean_over_time(samples.time[window], there) if k == window[-1] else None
             if rows[k]:
                 waiting.append(state)
             if shift is not None:
@@ -230,7 +230,7 @@ def _begun(
         return state, {}
     head = {int(k): read(int(k)) for k in _window(model, samples, readings)}
     if head:
-        mean = robust_mean(list(head.values()))
+        mean = mean_over_time(samples.time[list(head)], list(head.values()))
         state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
         head = dict.fromkeys(head, mean)
     return state, head

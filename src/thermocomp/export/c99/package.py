@@ -30,14 +30,12 @@ calls, faults among them, and compares with what thermocomp says.
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
 It prints how many calls are wrong (none), the largest difference, and how many bytes the state takes; its exit code is
-0 if all is well. {single}; for less memory `-DTC_ZERO_READINGS=60` (at least 2; the zero
-may be known earlier then, and the test does not fit). Compile all files of your program with the same of these:
+0 if all is well. {single}. Compile all files of your program in the same precision:
 otherwise it does not link. Never compile with `-ffast-math`.
 
 ## Run it
 
-Call it in a cycle, every ten seconds, with the time since the call before, measured or fixed. (At a shorter cycle the
-one call in which the zero becomes known has more to sort: 300 s / cycle readings of each input.)
+Call it in a cycle, every ten seconds, with the time since the call before, measured or fixed.
 
     #include "{name}.h"
     #include <math.h>                          /* NAN */
