@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compiledblock import COMPILERS, FLAGS, CompiledBlock
-from driftmodels import ACCEPTED
+from driftmodels import ACCEPTED, growing
 from families import HEAD, SINGLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -26,11 +26,12 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.core.watch import Watch
+from thermocomp.core.zero import Zeroing
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
 from thermocomp.export.onnx import package as onnxpackage
 from thermocomp.export.st import package as stpackage
-from thermocomp.export.vectors import make_readings, round_all
+from thermocomp.export.vectors import Readings, make_readings, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 
@@ -107,6 +108,23 @@ def test_what_was_judged_is_not_rounded() -> None:
     rounded = round_all(model, round_single)
     assert rounded.honest_error == judged
     assert rounded.may_lose(["t1_C"])
+
+
+@needs_compiler
+def test_the_mean_over_a_cycle_of_a_millisecond(tmp_path: Path) -> None:
+    """300,000 readings: a mean in single precision would not follow the last half of them."""
+    model = replace(growing("z_um", 2.0), zeroing=Zeroing(300.0, 300.0))
+    rows = 20.0 + np.minimum(np.arange(301_000) / 300_000.0, 1.0)
+    readings = Readings(rows[:, None], np.zeros(len(rows)), np.full(len(rows), 0.001))
+    compensator, offsets = Compensator.of([model], Limits(rate=1e6)), list[float]()
+    for flags in (("-UTC_FLOAT",), ("-DTC_FLOAT",)):
+        folder = tmp_path / flags[0]
+        folder.mkdir()
+        said = CompiledBlock(compensator, folder, flags=flags).run(readings)
+        assert 299_990 < (said.status[:, 0] == 0).sum() <= 300_001
+        offsets.append(float(said.correction[-1, 0]))
+    assert offsets[0] == pytest.approx(-2.0 * (21.0 - 20.5), abs=1e-5)
+    assert offsets[1] == pytest.approx(offsets[0], abs=1e-5)
 
 
 @needs_compiler

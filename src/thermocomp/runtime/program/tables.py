@@ -88,7 +88,7 @@ def gather(compensator: Compensator) -> Tables:
         "TARGETS": len(lines),
         "ENDS_OF_LINES": len(lines) + 1,
         "ENDS": 2,
-        "COLUMN": max(len(ranges), len(sensors)),
+        "COLUMN": max(len(ranges), len(sensors), 2),  # to sort one, gcc would warn of the index 1
         "has_speed": int(bool(zeroing.speed)),
         **_sizes(values),
         **_watch_sizes(watch),
