@@ -81,7 +81,8 @@ def test_known_live_when_it_is_known_in_a_file(
 def test_one_wrong_reading_has_no_effect_wherever_it_is(
     rows: list[tuple[float, float]], dead: float, where: int
 ) -> None:
-    time, values = np.cumsum([dt for dt, _ in rows], dtype=np.float64), np.array([v for _, v in rows])
+    time: NDArray[np.float64] = np.cumsum([dt for dt, _ in rows])
+    values = np.array([v for _, v in rows])
     rest = np.delete(values, where % len(values))
     values[where % len(values)] = dead
     assert rest.min() - 1e-9 <= mean_over_time(time, values) <= rest.max() + 1e-9
@@ -89,9 +90,10 @@ def test_one_wrong_reading_has_no_effect_wherever_it_is(
 
 @given(st.lists(st.tuples(st.floats(0.001, 60.0), st.floats(-30.0, 90.0)), min_size=3, max_size=60))
 def test_each_median_counts_for_its_time(rows: list[tuple[float, float]]) -> None:
-    time, values = np.cumsum([dt for dt, _ in rows], dtype=np.float64), np.array([v for _, v in rows])
-    medians = [float(np.median(values[max(k - 2, 0) : max(k - 2, 0) + 3])) for k in range(1, len(rows))]
-    expected = np.average(medians, weights=np.diff(time))
+    time: NDArray[np.float64] = np.cumsum([dt for dt, _ in rows])
+    values = np.array([v for _, v in rows])
+    medians = [float(np.median(values[k : k + 3])) for k in range(len(rows) - 2)]
+    expected = np.average(medians, weights=time[2:] - time[:-2])
     assert mean_over_time(time, values) == pytest.approx(expected, abs=1e-12)
 
 
@@ -114,21 +116,20 @@ def ramp(time: NDArray[np.float64]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("cycle", [0.001, 0.1, 1.0, 15.0, 60.0])
 def test_the_mean_does_not_depend_on_the_cycle(cycle: float) -> None:
     time = cycle * np.arange(round(300.0 / cycle) + 1)
-    mean = mean_over_time(time, ramp(time))
-    assert mean == pytest.approx(20.5, abs=1.5 * cycle / 300.0 + 1e-9)  # a median is as old as its middle reading
+    assert mean_over_time(time, ramp(time)) == pytest.approx(20.5, abs=1e-9)
 
 
 def test_two_cycles_in_one_interval_weigh_by_their_time() -> None:
     """A logger that records each second for a minute, and each 15 s after that: readings would say 20.33."""
     time = np.concatenate([np.arange(60.0), np.arange(60.0, 301.0, 15.0)])
-    assert mean_over_time(time, ramp(time)) == pytest.approx(20.5, abs=0.05)
+    assert mean_over_time(time, ramp(time)) == pytest.approx(20.5, abs=0.03)  # half a cycle at its end is missing
     assert ramp(time).mean() < 20.4
 
 
-def test_a_gap_counts_as_the_readings_about_it() -> None:
+def test_a_gap_counts_half_as_the_readings_before_it() -> None:
     time = np.concatenate([np.arange(0.0, 50.0, 5.0), np.arange(250.0, 301.0, 5.0)])
     values = np.where(time < 100.0, 20.0, 21.0)
-    assert mean_over_time(time, values) == pytest.approx(20.0 + 50.0 / 300.0, abs=6.0 / 300.0)
+    assert mean_over_time(time, values) == pytest.approx(20.0 + 150.0 / 295.0)
 
 
 def test_steps_of_a_sensor_are_averaged() -> None:

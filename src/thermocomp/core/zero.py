@@ -67,39 +67,41 @@ FIRST_READING = Zeroing(0.0, 0.0)
 class ZeroMean(NamedTuple):
     """Mean over time of the readings of the zero so far; its size does not depend on their number.
 
-    From the third reading on, the median of the last three readings counts for the time since the previous one: a
-    single wrong reading has no effect, and an irregular cycle weights no part of the interval more than another.
+    From the third reading on it is the mean of the medians of three successive readings: a single wrong reading has no
+    effect. Each median counts for half the time between the outer two of its readings, so an irregular cycle weights no
+    part of the interval more than another.
     """
 
     first: float = math.nan  #: time of the first reading [s]
-    last: float = math.nan  #: time of the last reading [s]
-    count: int = 0  #: number of readings, at most 3
+    before: float = math.nan  #: time of the last but one [s]
+    last: float = math.nan  #: time of the last one [s]
+    weight: float = 0.0  #: twice the time for which the medians count [s]
     mean: FloatArray = np.empty(0)  #: (..., n_inputs)
     recent: tuple[FloatArray, ...] = ()  #: last readings, at most two, (..., n_inputs) each
     resting: bool = False  #: the spindle was stopped in the first reading
 
     def belongs(self, zeroing: Zeroing, time: float, resting: bool) -> bool:
         """Return whether a reading belongs to the averaging interval."""
-        if not self.count:
+        if not self.recent:
             return True
         return (resting or not self.resting) and time - self.first <= zeroing.span(self.resting)
 
     def complete(self, zeroing: Zeroing) -> bool:
         """Return whether no later reading can belong to the averaging interval."""
-        return self.count > 0 and self.last - self.first >= zeroing.span(self.resting)
+        return bool(self.recent) and self.last - self.first >= zeroing.span(self.resting)
 
     def add(self, time: float, values: FloatArray, resting: bool) -> "ZeroMean":
         """Return the mean with one more reading, later than the previous one."""
-        if not self.count:
-            return ZeroMean(first=time, last=time, count=1, mean=values, recent=(values,), resting=resting)
-        before, previous = self.recent[0], self.recent[-1]
-        if self.count == 1:
-            mean = (previous + values) / 2.0
-        else:  # median of three
-            mean = np.maximum(np.minimum(before, previous), np.minimum(np.maximum(before, previous), values))
-        if self.count == 3:
-            mean = self.mean + (mean - self.mean) * ((time - self.last) / (time - self.first))
-        return self._replace(last=time, count=min(self.count + 1, 3), mean=mean, recent=(previous, values))
+        if not self.recent:
+            return ZeroMean(first=time, last=time, mean=values, recent=(values,), resting=resting)
+        one, two = self.recent[0], self.recent[-1]
+        longer = self._replace(before=self.last, last=time, recent=(two, values))
+        if len(self.recent) == 1:
+            return longer._replace(mean=(two + values) / 2.0)
+        mean, span = np.maximum(np.minimum(one, two), np.minimum(np.maximum(one, two), values)), time - self.before
+        if self.weight:
+            mean = self.mean + (mean - self.mean) * (span / (self.weight + span))
+        return longer._replace(mean=mean, weight=self.weight + span)
 
 
 def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[int, int]:

@@ -10,7 +10,6 @@ import numpy as np
 
 #: largest permitted number
 _LARGEST = 1e15
-_PLAIN = {str: "text", bool: "true or false", int: "a whole number"}
 _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
@@ -42,7 +41,7 @@ def decode(kind: Any, value: Any, place: str) -> Any:
         return None if value is None else decode(inner, value, place)
     if get_origin(kind) is not None:
         return _several(get_origin(kind), get_args(kind), value, place)
-    if kind in (float, bool, str, int):
+    if kind in (float, bool, str):
         return _plain(kind, value, place)
     hints = get_type_hints(kind)
     names = list(getattr(kind, "_fields", None) or [f.name for f in fields(kind)])
@@ -80,7 +79,7 @@ def _several(origin: Any, parts: tuple[Any, ...], value: Any, place: str) -> Any
 
 def _plain(kind: type, value: Any, place: str) -> Any:
     if kind is not float:
-        want(type(value) is kind, value, place, _PLAIN[kind])
+        want(type(value) is kind, value, place, "text" if kind is str else "true or false")
         return value
     if isinstance(value, str) and value in _WORDS:
         return _WORDS[value]

@@ -219,12 +219,12 @@ def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> Non
 
 
 def _check_averaged(averaged: ZeroMean, n: int, place: str) -> None:
-    count, recent = averaged.count, averaged.recent
-    want(0 <= count <= 3 and len(recent) == min(count, 2), count, place, "at most 3 readings, and the last two of them")
-    if not count:
+    first, before, last, recent = averaged.first, averaged.before, averaged.last, averaged.recent
+    if not recent:
         return
-    known = math.isfinite(averaged.first) and math.isfinite(averaged.last)
-    want(known and (averaged.first < averaged.last) == (count > 1), None, place, "the times of its readings")
+    ordered = first <= before < last if len(recent) > 1 else first == last
+    want(len(recent) <= 2 and ordered and math.isfinite(last - first), None, place, "times of its last two readings")
+    want(0.0 <= averaged.weight <= 2.0 * (last - first) * (1 + 1e-9), averaged.weight, f"{place}.weight", "a time")
     for values in (averaged.mean, *recent):
         _alike(values, (n,), f"{place}.values")
 

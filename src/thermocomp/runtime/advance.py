@@ -84,7 +84,7 @@ def _zeroed(
         values = averaged.mean
     reference = np.where(np.isnan(states[0].reference), averaged.mean, states[0].reference)
     states = [s._replace(reference=reference) for s in states]
-    if before.count:
+    if before.recent:
         states, _, _ = group.step(states, averaged.mean, 0.0)
     if before.last > before.first:
         states, _, _ = group.step(states, averaged.mean, before.last - before.first)

@@ -16,6 +16,8 @@ class Averaged(NamedTuple):
     resting: Condition
     first: Number
     last: Number
+    before_at: Number
+    weight: Number
     mean: Numbers
     before: Numbers
     previous: Numbers
@@ -28,6 +30,8 @@ class Averaged(NamedTuple):
             resting=s.zero_resting,
             first=s.zero_first,
             last=s.zero_last,
+            before_at=s.zero_before_at,
+            weight=s.zero_weight,
             mean=s.zero_mean,
             before=s.zero_before,
             previous=s.zero_previous,
@@ -41,6 +45,8 @@ class Averaged(NamedTuple):
             resting=s.watch_resting,
             first=s.watch_first,
             last=s.watch_last,
+            before_at=s.watch_before_at,
+            weight=s.watch_weight,
             mean=s.watch_mean,
             before=s.watch_before,
             previous=s.watch_previous,
@@ -68,6 +74,8 @@ class Averaged(NamedTuple):
         with when(self.readings.equals(0)):
             self.resting.set(w.stands)
             self.first.set(w.now)
+        with when(self.readings >= 2):
+            self.weight.set(self.weight + (w.now - self.before_at))
         for k in each("k", size):
             new = let("new", value(k))
             centre = let("centre", median(self.before[k], self.previous[k], new))
@@ -78,10 +86,11 @@ class Averaged(NamedTuple):
             with otherwise_when(self.readings.equals(2)):
                 self.mean[k] = centre
             with otherwise():
-                share = (w.now - self.last) / (w.now - self.first)
+                share = (w.now - self.before_at) / self.weight
                 self.mean[k] = self.mean[k] + (centre - self.mean[k]) * share
             self.before[k] = self.previous[k]
             self.previous[k] = new
+        self.before_at.set(self.last)
         self.last.set(w.now)
         with when(self.readings < 3):
             self.readings.set(self.readings + 1)
