@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compiledblock import COMPILERS, FLAGS, CompiledBlock
-from driftmodels import ACCEPTED, growing
+from driftmodels import ACCEPTED, ROOM, SPEED, growing
 from families import HEAD, SINGLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,10 +22,11 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
+from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.core.watch import Watch
+from thermocomp.core.watch import Watch, Watched
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
@@ -125,6 +126,48 @@ def test_the_mean_over_a_cycle_of_a_millisecond(tmp_path: Path) -> None:
         offsets.append(float(said.correction[-1, 0]))
     assert offsets[0] == pytest.approx(-2.0 * (21.0 - 20.5), abs=1e-5)
     assert offsets[1] == pytest.approx(offsets[0], abs=1e-5)
+
+
+def sixteen() -> Compensator:
+    """Return five targets of 16 temperatures and the speed with a watch, like the model of the demo."""
+    heat = [replace(ROOM, name=f"t{k}_C") for k in range(16)]
+    zeroing, taus = Zeroing(300.0, 10.0, SPEED.name), tuple(60.0 * 2.0**k for k in range(10))
+    parts = 16 * (1 + len(taus)) + 10
+    sensors = [
+        Watched(k, tuple(0.01 * (j % 16 != k) for j in range(parts - 10)) + (0.1,) * 10, 9.0, 9.0, 9.0, 7200.0, 0.2)
+        for k in range(16)
+    ]
+    states = tuple((16, 1.0 + 0.1 * k, 1200.0, 600.0) for k in range(10))
+    watch = Watch((*heat, SPEED), zeroing, taus, 6000.0, states, tuple(sensors))
+    model = LinearDynamic(
+        target="z_um",
+        unit="um",
+        inputs=(*heat, SPEED),
+        signals=tuple((k,) for k in range(17)),
+        direct=(0.1,) * 16 + (1e-4,),
+        lag_signals=tuple(k for k in range(17) for _ in taus),
+        time_constants=taus * 17,
+        lagged=((0.01,) * 16 + (1e-5,)) * len(taus),
+        zeroing=zeroing,
+        watch=watch,
+        honest_error=ACCEPTED,
+    )
+    return Compensator.of([replace(model, target=t) for t in ("x1_um", "x2_um", "y1_um", "y2_um", "z_um")])
+
+
+@needs_compiler
+def test_the_state_of_sixteen_sensors_with_a_watch_takes_20_kilobytes(tmp_path: Path) -> None:
+    """No readings are stored: it fits into a small controller."""
+    texts, sizes = cpackage.write_package(sixteen(), "x", FACTS), list[int]()
+    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
+        said = prove(tmp_path, texts, switch)
+        assert " 0 wrong" in said
+        sizes += [int(found) for found in re.findall(r"state: (\d+) bytes", said)]
+    assert 1_000 < sizes[1] < sizes[0] <= 20_000
+    (page,) = (
+        text for name, text in stpackage.write_package(sixteen(), "x", FACTS, "scl").items() if name[-3:] == ".md"
+    )
+    assert int(re.findall(rb"optimized data: (\d+) kB", page)[0]) >= sizes[0] // 1000
 
 
 @needs_compiler
