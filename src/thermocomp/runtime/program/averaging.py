@@ -77,19 +77,19 @@ class Averaged(NamedTuple):
         with when(self.readings >= 2):
             self.weight.set(self.weight + (w.now - self.before_at))
         for k in each("k", size):
-            new = let("new", value(k))
-            centre = let("centre", median(self.before[k], self.previous[k], new))
+            reading = let("reading", value(k))
+            centre = let("centre", median(self.before[k], self.previous[k], reading))
             with when(self.readings.equals(0)):
-                self.mean[k] = new
+                self.mean[k] = reading
             with otherwise_when(self.readings.equals(1)):
-                self.mean[k] = (self.previous[k] + new) / 2.0
+                self.mean[k] = (self.previous[k] + reading) / 2.0
             with otherwise_when(self.readings.equals(2)):
                 self.mean[k] = centre
             with otherwise():
                 share = (w.now - self.before_at) / self.weight
                 self.mean[k] = self.mean[k] + (centre - self.mean[k]) * share
             self.before[k] = self.previous[k]
-            self.previous[k] = new
+            self.previous[k] = reading
         self.before_at.set(self.last)
         self.last.set(w.now)
         with when(self.readings < 3):
