@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from compiledblock import COMPILERS, FLAGS, CompiledBlock
-from driftmodels import ACCEPTED
+from driftmodels import ACCEPTED, ROOM, SPEED, growing
 from families import HEAD, SINGLES
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,15 +22,17 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
+from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.core.watch import Watch
+from thermocomp.core.watch import Watch, Watched
+from thermocomp.core.zero import Zeroing
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
 from thermocomp.export.onnx import package as onnxpackage
 from thermocomp.export.st import package as stpackage
-from thermocomp.export.vectors import make_readings, round_all
+from thermocomp.export.vectors import Readings, make_readings, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 
@@ -107,6 +109,65 @@ def test_what_was_judged_is_not_rounded() -> None:
     rounded = round_all(model, round_single)
     assert rounded.honest_error == judged
     assert rounded.may_lose(["t1_C"])
+
+
+@needs_compiler
+def test_the_mean_over_a_cycle_of_a_millisecond(tmp_path: Path) -> None:
+    """300,000 readings: a mean in single precision would not follow the last half of them."""
+    model = replace(growing("z_um", 2.0), zeroing=Zeroing(300.0, 300.0))
+    rows = 20.0 + np.minimum(np.arange(301_000) / 300_000.0, 1.0)
+    readings = Readings(rows[:, None], np.zeros(len(rows)), np.full(len(rows), 0.001))
+    compensator, offsets = Compensator.of([model], Limits(rate=1e6)), list[float]()
+    for flags in (("-UTC_FLOAT",), ("-DTC_FLOAT",)):
+        folder = tmp_path / flags[0]
+        folder.mkdir()
+        said = CompiledBlock(compensator, folder, flags=flags).run(readings)
+        assert 299_990 < (said.status[:, 0] == 0).sum() <= 300_001
+        offsets.append(float(said.correction[-1, 0]))
+    assert offsets[0] == pytest.approx(-2.0 * (21.0 - 20.5), abs=1e-5)
+    assert offsets[1] == pytest.approx(offsets[0], abs=1e-5)
+
+
+def sixteen() -> Compensator:
+    """Return five targets of 16 temperatures and the speed with a watch, like the model of the demo."""
+    heat = [replace(ROOM, name=f"t{k}_C") for k in range(16)]
+    zeroing, taus = Zeroing(300.0, 10.0, SPEED.name), tuple(60.0 * 2.0**k for k in range(10))
+    parts = 16 * (1 + len(taus)) + 10
+    sensors = [
+        Watched(k, tuple(0.01 * (j % 16 != k) for j in range(parts - 10)) + (0.1,) * 10, 9.0, 9.0, 9.0, 7200.0, 0.2)
+        for k in range(16)
+    ]
+    states = tuple((16, 1.0 + 0.1 * k, 1200.0, 600.0) for k in range(10))
+    watch = Watch((*heat, SPEED), zeroing, taus, 6000.0, states, tuple(sensors))
+    model = LinearDynamic(
+        target="z_um",
+        unit="um",
+        inputs=(*heat, SPEED),
+        signals=tuple((k,) for k in range(17)),
+        direct=(0.1,) * 16 + (1e-4,),
+        lag_signals=tuple(k for k in range(17) for _ in taus),
+        time_constants=taus * 17,
+        lagged=((0.01,) * 16 + (1e-5,)) * len(taus),
+        zeroing=zeroing,
+        watch=watch,
+        honest_error=ACCEPTED,
+    )
+    return Compensator.of([replace(model, target=t) for t in ("x1_um", "x2_um", "y1_um", "y2_um", "z_um")])
+
+
+@needs_compiler
+def test_the_state_of_sixteen_sensors_with_a_watch_takes_20_kilobytes(tmp_path: Path) -> None:
+    """No readings are stored: it fits into a small controller."""
+    texts, sizes = cpackage.write_package(sixteen(), "x", FACTS), list[int]()
+    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
+        said = prove(tmp_path, texts, switch)
+        assert " 0 wrong" in said
+        sizes += [int(found) for found in re.findall(r"state: (\d+) bytes", said)]
+    assert 1_000 < sizes[1] < sizes[0] <= 20_000
+    (page,) = (
+        text for name, text in stpackage.write_package(sixteen(), "x", FACTS, "scl").items() if name[-3:] == ".md"
+    )
+    assert int(re.findall(rb"optimized data: (\d+) kB", page)[0]) >= sizes[0] // 1000
 
 
 @needs_compiler

@@ -13,7 +13,7 @@ from smallmachine import small_machine
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.core.zero import FIRST_READING, Zeroing, mean_over_time
 from thermocomp.iso230 import part3
 from thermocomp.judging import assessing
 from thermocomp.judging.judge import judge
@@ -116,16 +116,16 @@ def test_rezeroed_is_counted_from_there(method: str, known: bool) -> None:
     window = [0]  # a row every minute: the zero is one row, the spindle is stopped or not
     if samples.resting is not None and samples.resting[own][0]:
         window = list(range(6))
-    raw = second.table[TARGET].to_numpy()
-    assert samples.deviations[own, 0] == pytest.approx(raw - raw[window].mean(), abs=0.2)
+    raw, time = second.table[TARGET].to_numpy(), second.time[window]
+    assert samples.deviations[own, 0] == pytest.approx(raw - mean_over_time(time, raw[window]), abs=1e-9)
     ran = replay_compensated(model, samples, own)
-    assert ran.deviation[window].mean() == pytest.approx(0.0, abs=1e-9)
+    assert mean_over_time(time, ran.deviation[window]) == pytest.approx(0.0, abs=1e-9)
     assert replay(model, samples, own)[0] == pytest.approx(ran.deviation, abs=1e-9)
     assert (ran.compensated[: len(window) - 1] == 0.0).all()
     if known:
         going_on = stack([second], [TARGET], starts=Start("continued", "stated", (first,), gap))
         full = replay(model, going_on, own)[0]
-        assert ran.deviation == pytest.approx(full - full[window].mean(), abs=1e-9)
+        assert ran.deviation == pytest.approx(full - mean_over_time(time, full[window]), abs=1e-9)
     stressed = stress(model, samples, samples.deviations[own, 0], own, draws=3)
     assert stressed.predicted == pytest.approx(ran.deviation, abs=1e-9)
 

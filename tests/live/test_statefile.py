@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driftmodels import ACCEPTED, lags, static
+from driftmodels import ACCEPTED, ROOM, SPEED, lags, static
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError, ModelFileError
 from thermocomp.core.reading import Reading
+from thermocomp.core.watch import Watch, Watched
 from thermocomp.core.zero import Zeroing
 from thermocomp.files import jsonfile
 from thermocomp.files.typed import encode
@@ -28,7 +29,7 @@ from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero
-from thermocomp.runtime.state import CompensatorState, Status
+from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.virtual.datasets import record
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -95,6 +96,98 @@ def test_other_families_too(tmp_path: Path) -> None:
         state, _ = machine.step(state, reading, reading.time)
         statefile.write(state, machine, tmp_path / "state.json", NOW)
         assert same(statefile.read(tmp_path / "state.json", machine).state, state)
+
+
+# -- a restart while the zero is averaged ------------------------------------------------------------------------------
+
+AVERAGING = Zeroing(300.0, 10.0, "spindle_rpm")
+SENSOR = Watched(input=0, weights=(0.0, 0.5, 0.0, 0.25, 1.0), off=3.0, jump=2.0, moved=3.0, still=7200.0, unseen=0.2)
+WATCH = Watch(
+    inputs=(ROOM, replace(ROOM, name="t4_C"), SPEED),
+    zeroing=AVERAGING,
+    time_constants=(600.0,),
+    top_speed=6000.0,
+    states=((2, 1.5, 1200.0, 600.0),),
+    sensors=(SENSOR, replace(SENSOR, input=1, weights=(0.5, 0.0, 0.25, 0.0, 1.0))),
+)
+#: room temperature each 30 s, with a wrong one
+BEGINS = (20.0, 20.3, 24.9, 20.1, 19.8, 20.2, 20.4, 19.9, 20.0, 20.1, 20.3, 20.6, 20.8)
+
+
+def averaging() -> Compensator:
+    """Return the machine of `states/version_1.json`."""
+    models = [lags(room=True), static("y_um")]
+    return Compensator.of([replace(m, zeroing=AVERAGING, watch=WATCH, honest_error=ACCEPTED) for m in models])
+
+
+def go_on(machine: Compensator, state: CompensatorState, begin: int) -> tuple[CompensatorState, list[Compensated]]:
+    """Pass the readings from one on; the spindle starts at the last but one."""
+    done = []
+    for k, t in enumerate(BEGINS[begin:], begin):
+        values = {"t3_C": t, "t4_C": t - 0.25, "spindle_rpm": 3000.0 if k >= len(BEGINS) - 2 else 0.0}
+        state, said = machine.step(state, Reading(30.0 * k, values), 30.0 * k)
+        done.append(said)
+    return state, done
+
+
+def shown(state: CompensatorState) -> str:
+    return json.dumps(plain(encode((state.models, state.averaged, state.watches))))
+
+
+@pytest.mark.parametrize("rows", range(1, len(BEGINS)))
+def test_a_restart_while_the_zero_is_averaged_changes_nothing(rows: int) -> None:
+    machine = averaging()
+    whole, _ = go_on(machine, machine.start(), 0)
+    assert np.isfinite(whole.models[0].reference).all()
+    state = machine.start()
+    for k, t in enumerate(BEGINS[:rows]):
+        values = {"t3_C": t, "t4_C": t - 0.25, "spindle_rpm": 3000.0 if k >= len(BEGINS) - 2 else 0.0}
+        state, _ = machine.step(state, Reading(30.0 * k, values), 30.0 * k)
+    saved = statefile.loads(statefile.dumps(state, machine, NOW), machine).state
+    assert same(saved, state)
+    again = resume(saved, machine.start(), 0.0, tick=30.0 * (rows - 1))
+    assert shown(go_on(machine, again, rows)[0]) == shown(whole)
+
+
+def old_file() -> dict[str, Any]:
+    """Return a file of version 1, written while the zero was averaged, by a version that kept the readings."""
+    content: dict[str, Any] = json.loads((Path(__file__).parent / "states/version_1.json").read_text())
+    return content
+
+
+def test_a_file_with_the_readings_of_the_zero_goes_on_as_without_a_restart() -> None:
+    machine, content = averaging(), old_file()
+    begun = [*content["models"][0]["state"]["gathered"], content["models"][0]["state"]["watches"][0]["gathered"]]
+    assert [len(g["times"]) for g in begun] == [5, 0, 5]
+    found = statefile.loads(json.dumps(content), machine).state
+    state, done = machine.start(), list[Compensated]()
+    whole, without = go_on(machine, state, 0)
+    state, done = go_on(machine, found, 5)
+    assert same(state, whole)
+    assert [d.corrections for d in done] == [d.corrections for d in without[5:]]
+    assert done[-1].corrections["z_um"].offset != 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("times", [0.0, 30.0, "nan", 90.0, 120.0]),
+        ("times", [0.0, 30.0, 20.0, 90.0, 120.0]),
+        ("times", [0.0, 30.0]),
+        ("values", []),
+        ("values", [{"shape": [4], "values": [0.0, 20.0, 1.0, 1.0]}] * 5),
+        ("values", [{"shape": [2], "values": [0.0, "nan"]}] * 5),
+        ("resting", 1),
+    ],
+)
+@pytest.mark.parametrize("watch", [False, True])
+def test_invalid_readings_in_a_file_of_version_1_are_refused_by_name(name: str, value: object, watch: bool) -> None:
+    content = old_file()
+    stored = content["models"][0]["state"]
+    (stored["watches"][0]["gathered"] if watch else stored["gathered"][0])[name] = value
+    text = jsonfile.pack(replace(statefile.KIND, version=1), content["models"])
+    with pytest.raises(ModelFileError, match=r"state\.json: not a valid state of these models: .*(gathered|averaged)"):
+        statefile.loads(text, averaging(), "state.json")
 
 
 def test_a_file_of_before_probings_were_told_apart(machine: Compensator, samples: Samples) -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.machine import Channel
-from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.core.zero import FIRST_READING, Zeroing, mean_over_time
 from thermocomp.recordings import stacking
 from thermocomp.recordings.cycles import Cycle, make_single_cycle
 from thermocomp.recordings.recording import Recording
@@ -202,22 +202,24 @@ def _drift(start: float = 0.0, *, at_rest: int = 30, interval: float = 15.0, sta
 
 def test_the_zero_is_the_mean_over_five_minutes_at_rest() -> None:
     recording = _drift()
-    values = recording.table[["t1_C", "t2_C"]].to_numpy()
+    values, time = recording.table[["t1_C", "t2_C"]].to_numpy(), recording.time
     found = stacking.stack([recording], ["z_um"])
     assert found.zeroing == Zeroing(300.0, 10.0, "spindle_rpm")
-    assert found.reference()[0] == pytest.approx([*values[:21].mean(axis=0), 0.0], abs=1e-12)
+    assert found.reference()[0] == pytest.approx([*mean_over_time(time[:21], values[:21]), 0.0], abs=1e-12)
     assert found.deviations[:, 0].tolist() == recording.table["z_um"].tolist()  # what is measured stays as it is
     longer = stacking.stack([recording], ["z_um"], zeroing=Zeroing(1e4, 0.0, "spindle_rpm"))
-    assert longer.reference()[0] == pytest.approx([*values[:30].mean(axis=0), 0.0], abs=1e-12)
+    assert longer.reference()[0] == pytest.approx([*mean_over_time(time[:30], values[:30]), 0.0], abs=1e-12)
     short = stacking.stack([_drift(at_rest=5)], ["z_um"])
-    assert short.reference()[0][0] == pytest.approx(_drift(at_rest=5).table["t1_C"][:5].mean())
+    values = _drift(at_rest=5).table[["t1_C", "t2_C"]].to_numpy()
+    assert short.reference()[0] == pytest.approx([*mean_over_time(time[:5], values[:5]), 0.0], abs=1e-12)
 
 
 def test_what_starts_at_once_has_its_first_row_for_a_zero() -> None:
     for recording in (_drift(at_rest=0), replace(_drift(at_rest=0, interval=60.0), name="slow")):
         assert stacking.stack([recording], ["z_um"]).reference()[0][0] == recording.table["t1_C"][0]
     quick = _drift(at_rest=0, interval=2.0)
-    assert stacking.stack([quick], ["z_um"]).reference()[0][0] == pytest.approx(quick.table["t1_C"][:6].mean())
+    mean = mean_over_time(quick.time[:6], quick.table[["t1_C"]].to_numpy()[:6])
+    assert stacking.stack([quick], ["z_um"]).reference()[0][0] == pytest.approx(mean[0], abs=1e-12)
     mute = stacking.stack([_drift()], ["z_um"], ["t1_C"], zeroing=Zeroing())  # nothing says that it stands
     assert mute.reference()[0][0] == _drift().table["t1_C"][0]
 
@@ -226,10 +228,10 @@ def test_an_outlier_and_a_gap_are_not_in_the_zero() -> None:
     recording = _drift()
     recording.table.loc[4, "t1_C"] = 85.0
     recording.table.loc[6, "t2_C"] = np.nan
-    rows = [k for k in range(21) if k not in (4, 6)]
-    assert stacking.stack([recording], ["z_um"]).reference()[0][0] == pytest.approx(
-        recording.table["t1_C"][rows].mean()
-    )
+    rows, read = [k for k in range(21) if k != 6], recording.table["t1_C"].to_numpy()
+    zero = stacking.stack([recording], ["z_um"]).reference()[0][0]
+    assert zero == pytest.approx(mean_over_time(recording.time[rows], read[rows]), abs=1e-12)
+    assert zero == pytest.approx(np.delete(read[:21], [4, 6]).mean(), abs=0.1)
 
 
 @pytest.mark.parametrize(("level", "word"), [(0.0, "cold"), (2.5, "cold"), (5.0, "cold"), (6.0, ""), (-20.0, "")])

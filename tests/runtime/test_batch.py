@@ -18,7 +18,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.reading import Reading
 from thermocomp.core.terms import Variable
-from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.core.zero import FIRST_READING, Zeroing, mean_over_time
 from thermocomp.runtime import batch
 from thermocomp.runtime.compensator import Compensator
 
@@ -128,7 +128,7 @@ def test_counted_anew_the_correction_begins_at_zero_again() -> None:
     whole = batch.run(model, Limits(rate=1e9, magnitude=1e9), time, table, resting=stands)
     found = batch.run(model, Limits(rate=1e9, magnitude=1e9), time, table, resting=stands, anew=180)
     at_rest = slice(180, 191)  # 100 s at 10 s
-    assert found.deviation == pytest.approx(whole.deviation - whole.deviation[at_rest].mean())
+    assert found.deviation == pytest.approx(whole.deviation - mean_over_time(time[at_rest], whole.deviation[at_rest]))
     assert (found.compensated[:190] == 0.0).all()
     assert found.compensated[190:] == pytest.approx(found.deviation[190:])
 

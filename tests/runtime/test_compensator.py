@@ -290,7 +290,8 @@ def test_the_zero_is_the_mean_of_the_first_minutes_at_rest() -> None:
         last = time
         if k >= 20:
             assert found[k][1] == -float(deviation)
-    assert all(not s.gathered[0].times for s, _ in found[20:])
+    assert all(len(s.averaged[0].recent) == 2 for s, _ in found[1:20])
+    assert all(not s.averaged[0].recent for s, _ in found[20:])
 
 
 def test_the_zero_ends_where_the_spindle_starts() -> None:
@@ -318,6 +319,34 @@ def test_an_outlier_and_a_dead_reading_are_not_in_the_zero() -> None:
     rows[3], rows[7] = (45.0, 27.0, 0.0), (105.0, math.nan, 0.0)  # 7 degC off is no machine that does not start
     found = live([replace(model(), zeroing=AVERAGING)], rows)
     assert found[-1][0].models[0].reference[0] == pytest.approx(20.01, abs=0.002)
+
+
+@pytest.mark.parametrize("where", [0, 1, 2, 10, 19, 20])
+@pytest.mark.parametrize("wrong", [85.0, 27.0])
+def test_a_wrong_reading_is_not_in_the_zero_wherever_it_is(where: int, wrong: float) -> None:
+    """85 degC, as a DS18B20 reads after power-on, does not pass the gate; 27 degC does."""
+    rows = [(15.0 * k, 20.0 + 0.01 * (k % 3), 0.0) for k in range(22)]
+    rows[where] = (rows[where][0], wrong, 0.0)
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    assert found[-1][0].models[0].reference[0] == pytest.approx(20.01, abs=0.0025)
+
+
+@pytest.mark.parametrize("cycle", [0.125, 1.0, 15.0, 60.0])
+def test_the_interval_counts_whatever_the_cycle(cycle: float) -> None:
+    rows = [(cycle * k, 20.0 + cycle * k / 300.0, 0.0) for k in range(round(330.0 / cycle) + 1)]
+    found = live([replace(model(), zeroing=AVERAGING)], rows)
+    known = [math.isfinite(state.models[0].reference[0]) for state, _ in found]
+    assert rows[known.index(True)][0] == 300.0
+    assert found[-1][0].models[0].reference[0] == pytest.approx(20.5, abs=1e-9)
+
+
+def test_a_gap_in_the_interval_counts_as_the_readings_about_it() -> None:
+    times = [0.0, 15.0, 30.0, 45.0, 60.0, 240.0, 255.0, 270.0, 285.0, 300.0, 315.0]
+    found = live([replace(model(), zeroing=AVERAGING)], [(t, 20.0 if t < 100.0 else 21.0, 0.0) for t in times])
+    assert found[-1][0].models[0].reference[0] == pytest.approx(20.5)  # half of the gap each
+    late = live([replace(model(), zeroing=AVERAGING)], [(t, 20.0 + t / 1000.0, 0.0) for t in (0.0, 30.0, 60.0, 900.0)])
+    assert late[-2][1] == 0.0 != late[-1][1]  # a reading after the interval ends it
+    assert late[-1][0].models[0].reference[0] == pytest.approx(20.03)
 
 
 def test_outside_inputs_are_told() -> None:

@@ -5,6 +5,7 @@ machine. The readings of this interval are themselves replaced by their mean: th
 models with memory start from the mean instead of one noisy reading.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -17,12 +18,8 @@ from thermocomp.core.bounds import GAP, check_between, check_name
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: maximum number of averaged readings at any rate; it reduces the noise sufficiently, and bounds the memory
-MOST = 600
 #: below this speed the spindle counts as stopped: a tachometer may show a few revolutions at rest [1/min]
 STANDS = 10.0
-#: distance from the median, in median absolute deviations, beyond which a value is an outlier (four sigma if normal)
-FAR = 6.0
 
 
 @dataclass(frozen=True)
@@ -58,40 +55,59 @@ class Zeroing:
         """Return whether a reading of `speed` shows that the spindle is stopped; False if it is not a number."""
         return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
 
+    def span(self, resting: bool) -> float:
+        """Return the averaging time if the spindle was stopped in the first reading, or not [s]."""
+        return self.at_rest if resting else self.otherwise
+
 
 #: the zero is the first reading: for models not trained on recordings, and for papers that specify it
 FIRST_READING = Zeroing(0.0, 0.0)
 
 
-class Gathered(NamedTuple):
-    """Readings collected for averaging the zero."""
+class ZeroMean(NamedTuple):
+    """Mean over time of the readings of the zero so far; its size does not depend on their number.
 
-    times: tuple[float, ...] = ()  #: [s]
-    values: tuple[FloatArray, ...] = ()  #: (n_inputs,) each
+    From the third reading on it is the mean of the medians of three successive readings: a single wrong reading has no
+    effect. Each median counts for half the time between the outer two of its readings, so an irregular cycle weights no
+    part of the interval more than another.
+    """
+
+    first: float = math.nan  #: time of the first reading [s]
+    before: float = math.nan  #: time of the last but one [s]
+    last: float = math.nan  #: time of the last one [s]
+    weight: float = 0.0  #: twice the time for which the medians count [s]
+    mean: FloatArray = np.empty(0)  #: (..., n_inputs)
+    recent: tuple[FloatArray, ...] = ()  #: last readings, at most two, (..., n_inputs) each
     resting: bool = False  #: the spindle was stopped in the first reading
 
     def belongs(self, zeroing: Zeroing, time: float, resting: bool) -> bool:
         """Return whether a reading belongs to the averaging interval."""
-        if not self.times:
+        if not self.recent:
             return True
-        if len(self.times) >= MOST or (self.resting and not resting):
-            return False
-        return time - self.times[0] <= self._span(zeroing)
+        return (resting or not self.resting) and time - self.first <= zeroing.span(self.resting)
 
     def complete(self, zeroing: Zeroing) -> bool:
         """Return whether no later reading can belong to the averaging interval."""
-        return bool(self.times) and (len(self.times) >= MOST or self.times[-1] - self.times[0] >= self._span(zeroing))
+        return bool(self.recent) and self.last - self.first >= zeroing.span(self.resting)
 
-    def add(self, time: float, values: FloatArray, resting: bool) -> "Gathered":
-        """Return the collected readings with a further reading appended."""
-        return Gathered((*self.times, time), (*self.values, values), self.resting if self.times else resting)
-
-    def _span(self, zeroing: Zeroing) -> float:
-        return zeroing.at_rest if self.resting else zeroing.otherwise
+    def add(self, time: float, values: FloatArray, resting: bool) -> "ZeroMean":
+        """Return the mean with one more reading, later than the previous one."""
+        if not self.recent:
+            return ZeroMean(first=time, last=time, mean=values, recent=(values,), resting=resting)
+        one, two = self.recent[0], self.recent[-1]
+        longer = self._replace(before=self.last, last=time, recent=(two, values))
+        if len(self.recent) == 1:
+            return longer._replace(mean=(two + values) / 2.0)
+        mean, span = np.maximum(np.minimum(one, two), np.minimum(np.maximum(one, two), values)), time - self.before
+        if self.weight:
+            mean = self.mean + (mean - self.mean) * (span / (self.weight + span))
+        return longer._replace(mean=mean, weight=self.weight + span)
 
 
 def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[int, int]:
     """Return the number of readings averaged for the zero of a test, and the index of the reading that completes it.
+
+    The same as `ZeroMean.belongs` and `ZeroMean.complete`, for all readings at once.
 
     Parameters
     ----------
@@ -100,21 +116,21 @@ def first_rows(zeroing: Zeroing, time: FloatArray, resting: BoolArray) -> tuple[
     resting : ndarray of bool of shape (n_readings,)
         True where the spindle is known to be stopped.
     """
-    gathered, nothing = Gathered(), np.empty(0)
-    for k, (t, r) in enumerate(zip(time.tolist(), resting.tolist(), strict=True)):
-        if not gathered.belongs(zeroing, t, r):
-            return k, k
-        gathered = gathered.add(t, nothing, r)
-        if gathered.complete(zeroing):
-            return k + 1, k
-    return len(time), len(time)
+    if not len(time):
+        return 0, 0
+    passed, span = time - time[0], zeroing.span(bool(resting[0]))
+    belongs = (passed <= span) & (resting | ~resting[0])
+    count = len(time) if belongs.all() else int(belongs.argmin())
+    return count, count - 1 if passed[count - 1] >= span else count
 
 
-def robust_mean(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
-    """Return the mean over the first axis without values further than `FAR` median deviations from the median.
+def mean_over_time(time: FloatArray, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
+    """Return the mean over time of readings as `ZeroMean` has it.
 
     Parameters
     ----------
+    time : ndarray of shape (n_readings,)
+        Increasing [s].
     values : array of shape (n_readings, ...)
         Finite values.
 
@@ -122,12 +138,10 @@ def robust_mean(values: FloatArray | Sequence[FloatArray]) -> FloatArray:
     -------
     ndarray of shape (...)
     """
-    table = np.asarray(values, dtype=np.float64)
-    if len(table) < 3:
-        return np.asarray(table.mean(axis=0))
-    off = np.abs(table - np.median(table, axis=0))
-    near = off <= FAR * np.median(off, axis=0)
-    return np.asarray((np.where(near, table, 0.0)).sum(axis=0) / near.sum(axis=0))
+    averaged = ZeroMean()
+    for t, own in zip(time.tolist(), values, strict=True):
+        averaged = averaged.add(t, own, resting=False)
+    return averaged.mean
 
 
 def find_zero(
@@ -157,5 +171,5 @@ def find_zero(
         return zero, values
     window = rows[: first_rows(zeroing, time[rows], resting[rows])[0]]
     rested = values.copy()
-    rested[window] = robust_mean(values[window])
+    rested[window] = mean_over_time(time[window], values[window])
     return np.where(np.isnan(zero), rested[window[0]], zero), rested

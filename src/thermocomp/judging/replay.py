@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import Zeroing, first_rows, robust_mean
+from thermocomp.core.zero import Zeroing, first_rows, mean_over_time
 from thermocomp.judging.probing import Probed, Probings
 from thermocomp.judging.watched import believe
 from thermocomp.recordings.recording import Recording
@@ -192,7 +192,7 @@ def walk(model: ErrorModel, samples: Samples, rows: BoolArray, disturb: Disturb 
             waiting.append(some)
             if shift is None:
                 there += list(some.deviation[np.isin(some.rows, window)])
-                shift = np.mean(there, axis=0) if some.rows[-1] >= window[-1] else None
+                shift = mean_over_time(samples.time[window], there) if some.rows[-1] >= window[-1] else None
             if shift is not None:
                 for done in waiting:
                     asked = rows[done.rows]
@@ -221,7 +221,7 @@ def _walk_test(
     if np.isnan(state.reference).any():
         head = _window(model, samples, mine[usable[mine]])
     if head.size:
-        mean = robust_mean(read(head))
+        mean = mean_over_time(samples.time[head], read(head))
         state = state._replace(reference=np.where(np.isnan(state.reference), mean, state.reference))
     stepped = mine[_needed(model, usable[mine], wanted[mine])]
     asked = mine[wanted[mine]]

@@ -6,13 +6,14 @@ import math
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import AwareDatetime
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, ModelFileError
-from thermocomp.core.zero import MOST, Gathered
+from thermocomp.core.zero import ZeroMean
 from thermocomp.files import jsonfile
 from thermocomp.files.modelfile import entry_of
 from thermocomp.files.typed import decode, encode, want
@@ -20,7 +21,7 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS, WatchState
 
-KIND = jsonfile.Format("thermocomp-state", 1, "state file", "thermocomp serve")
+KIND = jsonfile.Format("thermocomp-state", 2, "state file", "thermocomp serve")
 
 
 #: maximum magnitude of an error [um]
@@ -34,6 +35,14 @@ class _Stored:
     written: AwareDatetime
     models: str
     state: dict[str, Any]
+
+
+class _Readings(NamedTuple):
+    """Readings of an unknown zero, in a file of version 1."""
+
+    times: tuple[float, ...]
+    values: tuple[FloatArray, ...]
+    resting: bool
 
 
 @dataclass(frozen=True)
@@ -72,18 +81,49 @@ def dumps(state: CompensatorState, compensator: Compensator, written: datetime) 
 
 def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     """Return the state in the text of a state file, or raise an error if it is damaged or of other models."""
-    (stored,) = jsonfile.unpack(KIND, _Stored, text, source).models[:1]
+    content = jsonfile.unpack(KIND, _Stored, text, source)
+    stored = content.models[0]
     if stored.models != fingerprint(compensator):
         raise ModelFileError(
             f"{source}: this state belongs to other models; start without the file, or with the models to which it "
             "belongs"
         )
     try:
-        state = decode(CompensatorState, stored.state, "state")
+        entry = _of_version_1(stored.state) if content.version == 1 else stored.state
+        state = decode(CompensatorState, entry, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
         raise ModelFileError(f"{source}: not a valid state of these models: {e}; start without the file") from e
     return Saved(stored.written, compensator.share(state.models, state))
+
+
+def _of_version_1(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return a state of version 1 with the mean over the readings of an unknown zero in place of these readings."""
+    found = {"averaged" if name == "gathered" else name: value for name, value in entry.items()}
+    for name, old in found.items():
+        if name == "averaged" and isinstance(old, list):
+            found[name] = [_mean(readings, f"state.gathered.{k}") for k, readings in enumerate(old)]
+        if name == "watches" and isinstance(old, list):
+            found[name] = [_watch_of_version_1(watch, f"state.watches.{k}") for k, watch in enumerate(old)]
+    return found
+
+
+def _watch_of_version_1(entry: Any, place: str) -> Any:
+    if not isinstance(entry, dict):
+        return entry
+    return {
+        "averaged" if name == "gathered" else name: _mean(value, f"{place}.gathered") if name == "gathered" else value
+        for name, value in entry.items()
+    }
+
+
+def _mean(entry: Any, place: str) -> Any:
+    readings, averaged = decode(_Readings, entry, place), ZeroMean()
+    want(len(readings.times) == len(readings.values), None, place, "a time for each reading")
+    for time, values in zip(readings.times, readings.values, strict=True):
+        want(math.isfinite(time) and not time <= averaged.last, time, f"{place}.times", "increasing numbers")
+        averaged = averaged.add(time, values, readings.resting)
+    return encode(averaged)
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
@@ -128,10 +168,10 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         want(number is None or math.isfinite(number) or name == "away", number, name, "a finite number")
     want(all(0.0 <= v < math.inf for v in state.idle.values()), None, "idle", "times")
     want(all(-math.inf < t < math.inf for k in state.probed.values() for t in k.values()), None, "probed", "times")
-    for name in ("models", "gathered", "watches"):
+    for name in ("models", "averaged", "watches"):
         found, expected = len(getattr(state, name)), len(getattr(cold, name))
         want(found == expected, found, name, f"{expected} of them")
-    for k, (model, own, begun) in enumerate(zip(compensator.models, state.models, state.gathered, strict=True)):
+    for k, (model, own, begun) in enumerate(zip(compensator.models, state.models, state.averaged, strict=True)):
         place, n = f"models.{k}", len(model.inputs)
         _alike(own.reference, (n,), f"{place}.reference", finite=False)
         memory = model.step(model.init(np.zeros(n)), np.zeros(n), 0.0)[0].memory
@@ -140,7 +180,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
             _alike(own.reference, (n,), f"{place}.reference")
         _alike(own.deviation, (), f"{place}.deviation")
         _alike(own.outside, (n,), f"{place}.outside")
-        _check_gathered(begun, n, f"gathered.{k}")
+        _check_averaged(begun, n, f"averaged.{k}")
     for k, (watch, seen, first) in enumerate(zip(compensator.watches, state.watches, cold.watches, strict=True)):
         _check_watch(seen, first, len(watch.inputs), f"watches.{k}")
     for target, learned in state.learned.items():
@@ -175,13 +215,17 @@ def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> Non
     want(not known.size or known.max() <= seen.time, None, place, "no instant later than its last update")
     want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"{place}.since", "the time of each failure")
     want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
-    _check_gathered(seen.gathered, n, f"{place}.gathered")
+    _check_averaged(seen.averaged, n, f"{place}.averaged")
 
 
-def _check_gathered(gathered: Gathered, n: int, place: str) -> None:
-    want(len(gathered.times) == len(gathered.values) <= MOST, len(gathered.times), place, f"at most {MOST} readings")
-    want(all(map(math.isfinite, gathered.times)), None, f"{place}.times", "numbers")
-    for values in gathered.values:
+def _check_averaged(averaged: ZeroMean, n: int, place: str) -> None:
+    first, before, last, recent = averaged.first, averaged.before, averaged.last, averaged.recent
+    if not recent:
+        return
+    ordered = first <= before < last if len(recent) > 1 else first == last
+    want(len(recent) <= 2 and ordered and math.isfinite(last - first), None, place, "times of its last two readings")
+    want(0.0 <= averaged.weight <= 2.0 * (last - first) * (1 + 1e-9), averaged.weight, f"{place}.weight", "a time")
+    for values in (averaged.mean, *recent):
         _alike(values, (n,), f"{place}.values")
 
 

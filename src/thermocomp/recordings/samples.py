@@ -14,7 +14,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
-from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, robust_mean
+from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, mean_over_time
 from thermocomp.recordings.starts import Start
 
 
@@ -106,8 +106,8 @@ class Samples:
                     f"{self.test_names[k]}: no row has a number in all of the inputs {names}; leave out inputs without "
                     "values"
                 )
-            count, _ = first_rows(self.zeroing, self.time[rows], self.stands[rows])
-            zero[k] = np.where(self.rezeroed, robust_mean(self.values[rows[:count]]), 0.0)
+            window = rows[: first_rows(self.zeroing, self.time[rows], self.stands[rows])[0]]
+            zero[k] = np.where(self.rezeroed, mean_over_time(self.time[window], self.values[window]), 0.0)
         return zero
 
     def given_zero(self, test: int, inputs: Sequence[int]) -> FloatArray | None:
@@ -134,7 +134,7 @@ class Samples:
     def _change(self) -> FloatArray:
         values, reference = self.values.copy(), self.reference()  # raises an error for a test without usable rows
         for window in self._windows() if self.rezeroed.any() else []:
-            values[window] = robust_mean(values[window])
+            values[window] = mean_over_time(self.time[window], values[window])
         return values - reference[self.test]
 
     def _windows(self) -> Iterator[IntArray]:

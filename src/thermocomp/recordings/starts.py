@@ -11,7 +11,7 @@ import numpy as np
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.core.zero import Zeroing, first_rows, robust_mean
+from thermocomp.core.zero import Zeroing, first_rows, mean_over_time
 from thermocomp.recordings.recording import Recording
 
 Word = Literal["cold", "continued", "rezeroed", "known"]
@@ -180,8 +180,10 @@ def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = Fals
     there = np.flatnonzero(np.isfinite(values))
     if not there.size:
         return float("nan")
-    count, _ = first_rows(zeroing, recording.time[there], find_resting_rows(recording, zeroing)[there])
-    return float(robust_mean(values[there[-1:]] if end else values[there[:count]]))
+    if end:
+        return float(values[there[-1]])
+    window = there[: first_rows(zeroing, recording.time[there], find_resting_rows(recording, zeroing)[there])[0]]
+    return float(mean_over_time(recording.time[window], values[window]))
 
 
 def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[Channel], zeroing: Zeroing) -> Start:

@@ -9,7 +9,7 @@ import numpy as np
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.reading import Reading
 from thermocomp.core.state import State
-from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.group import Group
 
 
@@ -17,7 +17,7 @@ class Advanced(NamedTuple):
     """States and outputs of all models after a reading."""
 
     states: tuple[State, ...]
-    gathered: tuple[Gathered, ...]  #: readings averaged for a zero that is not yet known
+    averaged: tuple[ZeroMean, ...]  #: mean of the readings of a zero that is not yet known
     said: list[float]  #: deviation of each model; nan while its zero is unknown
     half_widths: list[float]  #: of the uncertainty bands; nan without a band
     values: list[FloatArray]  #: inputs of each model; readings of the zero are replaced by their mean
@@ -27,7 +27,7 @@ class Advanced(NamedTuple):
 def advance(
     groups: Sequence[Group],
     states: Sequence[State],
-    gathered: Sequence[Gathered],
+    averaged: Sequence[ZeroMean],
     reading: Reading,
     time: float,
     dt: float,
@@ -41,7 +41,7 @@ def advance(
     dt : float
         Time since the previous reading [s].
     """
-    after, begins, n = list(states), list(gathered), len(states)
+    after, begins, n = list(states), list(averaged), len(states)
     said, widths, given, outside = [math.nan] * n, [math.nan] * n, [np.empty(0)] * n, list[str]()
     for group in groups:
         first, known = group.members[0], True
@@ -60,7 +60,7 @@ def advance(
             after[k], said[k], widths[k], given[k] = state, answer, width, values
     return Advanced(
         states=tuple(after),
-        gathered=tuple(begins),
+        averaged=tuple(begins),
         said=said,
         half_widths=widths,
         values=given,
@@ -69,23 +69,23 @@ def advance(
 
 
 def _zeroed(
-    group: Group, states: list[State], gathered: Gathered, reading: tuple[float, FloatArray, bool]
-) -> tuple[list[State], Gathered, bool, FloatArray]:
+    group: Group, states: list[State], before: ZeroMean, reading: tuple[float, FloatArray, bool]
+) -> tuple[list[State], ZeroMean, bool, FloatArray]:
     """Add a reading to the zero if it belongs there; return whether the zero is now known, and the zeroed reading.
 
     Once the zero is known, the models are advanced over the earlier readings as if it had been known from the start;
     all readings of the zero are replaced by their mean.
     """
-    before, values, zeroing = gathered, reading[1], group.lead.zeroing
-    if gathered.belongs(zeroing, reading[0], reading[2]):
-        gathered = gathered.add(*reading)
-        if not gathered.complete(zeroing):
-            return states, gathered, False, values
-        values = robust_mean(gathered.values)
-    mean, last = robust_mean(gathered.values), gathered.times[0]
-    reference = np.where(np.isnan(states[0].reference), mean, states[0].reference)
+    averaged, values, zeroing = before, reading[1], group.lead.zeroing
+    if before.belongs(zeroing, reading[0], reading[2]):
+        averaged = before.add(*reading)
+        if not averaged.complete(zeroing):
+            return states, averaged, False, values
+        values = averaged.mean
+    reference = np.where(np.isnan(states[0].reference), averaged.mean, states[0].reference)
     states = [s._replace(reference=reference) for s in states]
-    for time in before.times:
-        states, _, _ = group.step(states, mean, time - last)
-        last = time
-    return states, Gathered(), True, values
+    if before.recent:
+        states, _, _ = group.step(states, averaged.mean, 0.0)
+    if before.last > before.first:
+        states, _, _ = group.step(states, averaged.mean, before.last - before.first)
+    return states, ZeroMean(), True, values

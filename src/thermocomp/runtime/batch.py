@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import Gathered, find_zero, first_rows, robust_mean
+from thermocomp.core.zero import ZeroMean, find_zero, first_rows, mean_over_time
 from thermocomp.runtime import adaptation
 from thermocomp.runtime.gate import explain_implausible, find_plausible_range
 from thermocomp.runtime.limits import fade, limit_offset
@@ -156,36 +156,37 @@ class _Gate(NamedTuple):
     known: int  #: row from which the zero is known and the correction starts to move
     why: str  #: reason why the first rejected complete reading did not pass
     window: list[int]  #: rows of the zero
+    mean: FloatArray  #: (n_inputs,), of these rows
 
 
 def _of_gate(values: FloatArray, gate: _Gate) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Return the readings with those of the zero replaced by their mean, which of them pass, and the zero."""
     rested = values.copy()
     if gate.window:
-        rested[gate.window] = robust_mean(values[gate.window])
+        rested[gate.window] = gate.mean
     return rested, gate.passed, gate.zero
 
 
 def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: BoolArray, zero: FloatArray) -> _Gate:
     """Return which readings pass the gate of the compensator, the zero, and the rows averaged for it."""
     complete = np.asarray(np.isfinite(values).all(axis=1))
-    passed, why, known, window = complete.copy(), "", 0, list[int]()
+    passed, why, known, window, averaged = complete.copy(), "", 0, list[int](), ZeroMean()
     if np.isnan(zero).any():  # the first readings that pass determine the zero
-        gathered, known = Gathered(), len(time)
+        known = len(time)
         for row in np.flatnonzero(complete).tolist():
             found = explain_implausible(model, values[row].tolist(), zero.tolist())
             if found:
                 passed[row], why = False, why or found
                 continue
-            if gathered.belongs(model.zeroing, float(time[row]), bool(stands[row])):
-                gathered = gathered.add(float(time[row]), values[row], bool(stands[row]))
+            if averaged.belongs(model.zeroing, float(time[row]), bool(stands[row])):
+                averaged = averaged.add(float(time[row]), values[row], bool(stands[row]))
                 window.append(row)
-                if not gathered.complete(model.zeroing):
+                if not averaged.complete(model.zeroing):
                     continue
             known = row
             break
-        if gathered.times:
-            zero = np.where(np.isnan(zero), robust_mean(gathered.values), zero)
+        if window:
+            zero = np.where(np.isnan(zero), averaged.mean, zero)
     later = slice(min(known + 1, len(time)) if known else 0, None)
     bounds = [find_plausible_range(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
     low, high = np.array(bounds).reshape(-1, 2).T
@@ -194,7 +195,7 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
     turned = np.flatnonzero(complete & ~passed)
     if turned.size and not why:
         why = explain_implausible(model, values[turned[0]].tolist(), zero.tolist())
-    return _Gate(passed=passed, zero=zero, known=known, why=why, window=window)
+    return _Gate(passed=passed, zero=zero, known=known, why=why, window=window, mean=averaged.mean)
 
 
 def _counted(
@@ -203,7 +204,7 @@ def _counted(
     """Return the deviations relative to the new zero, and the row from which the correction moves again."""
     own = anew + np.flatnonzero(used[anew:])
     count, known = first_rows(model.zeroing, time[own], stands[own])
-    shift = float(deviation[own[:count]].mean()) if count else 0.0
+    shift = float(mean_over_time(time[own[:count]], deviation[own[:count]])) if count else 0.0
     return deviation - shift, int(own[known]) if known < len(own) else len(time)
 
 

@@ -25,7 +25,7 @@ from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.state import State
 from thermocomp.core.watch import Watch
-from thermocomp.core.zero import Gathered
+from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import Advanced, advance
 from thermocomp.runtime.clocking import place
@@ -164,7 +164,6 @@ class Compensator:
         """Return the state of a compensator before the first reading: all corrections are zero."""
         none = {target: Correction(0.0) for target in self.lines}
         models, watches = [m.init() for m in self.models], tuple(begin(w) for w in self.watches)
-        gathered = (Gathered(),) * len(self.models)
         return self.share(
             models,
             CompensatorState(
@@ -174,7 +173,7 @@ class Compensator:
                 clock=None,
                 taken=None,
                 origin=0.0,
-                gathered=gathered,
+                averaged=(ZeroMean(),) * len(self.models),
                 watches=watches,
                 idle={},
                 learned={},
@@ -241,7 +240,7 @@ class Compensator:
             )
         dt = 0.0 if state.time is None else instant.time - state.time
         travel = travel_time(state, tick, self.limits)
-        stepped = advance(self.groups, state.models, state.gathered, reading, instant.time, dt)
+        stepped = advance(self.groups, state.models, state.averaged, reading, instant.time, dt)
         failed = Lookout.failed(self._lookouts, state.watches)
         done = self._drive(state, stepped, (reading.time, instant.time), fresh, failed, travel)
         left = rest(state, done.corrections, tick, self.lines, self.limits, done.held, driven=done.states)
@@ -251,7 +250,7 @@ class Compensator:
             corrections=left.corrections,
             clock=left.clock,
             idle=left.idle,
-            gathered=stepped.gathered,
+            averaged=stepped.averaged,
             learned=done.learned,
             probed=remember(state, probed, instant.time) if probed else state.probed,
             references=done.references,

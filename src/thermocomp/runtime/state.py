@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.state import State
-from thermocomp.core.zero import Gathered
+from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.watch import WatchState
 
@@ -45,7 +45,7 @@ class CompensatorState(NamedTuple):
     clock: float | None  #: latest time of a step, on the monotonic clock of the process [s]
     taken: float | None  #: time of the last accepted reading on the same clock, or `away` after it [s]
     origin: float  #: amount by which the clock of the readings was set; nan: unknown, after a restart [s]
-    gathered: tuple[Gathered, ...]  #: readings averaged for the zero, one per model; empty once it is known
+    averaged: tuple[ZeroMean, ...]  #: mean of the readings of an unknown zero, one per model; empty once it is known
     watches: tuple[WatchState, ...]  #: of the temperatures
     idle: dict[str, float]  #: time for which no model has driven a target or axis; absent: driven [s]
     learned: dict[str, Adaptation]  #: adaptations by probings, by target or axis

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.watch import FASTER, LASTING, Watch
-from thermocomp.core.zero import Gathered, robust_mean
+from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.blame import USUAL, one_fails, weigh_swaps
 from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
@@ -44,7 +44,7 @@ class WatchState(NamedTuple):
     """State of the watch between two readings; arrays are (..., n_sensors) unless noted otherwise."""
 
     reference: FloatArray  #: (..., n_inputs), zero; nan while unknown
-    gathered: Gathered  #: readings averaged for the zero
+    averaged: ZeroMean  #: mean of the readings of an unknown zero
     time: float  #: of the last check; nan before the first [s]
     memory: FloatArray  #: (..., n_memory), of the predictions
     traces: FloatArray  #: (..., n_lags * n_sensors), lags of the differences: effect of a failure on `memory`
@@ -81,7 +81,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     traces = np.zeros((*runs, len(watch.time_constants) * len(watch.sensors)))
     return WatchState(
         reference=zero,
-        gathered=Gathered(),
+        averaged=ZeroMean(),
         time=np.nan,
         memory=memory,
         traces=traces,
@@ -165,22 +165,22 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
     """Add a reading to the zero if unknown; then start at rest in the zero, or else in the first reading."""
-    gathered, heat = state.gathered, watch.bank.temperatures
+    averaged, heat = state.averaged, watch.bank.temperatures
     unknown = bool(np.isnan(state.reference).any())
-    if unknown and gathered.belongs(watch.zeroing, time, resting):
-        gathered = gathered.add(time, values, resting)
-        if not gathered.complete(watch.zeroing):
-            return state._replace(gathered=gathered)
+    if unknown and averaged.belongs(watch.zeroing, time, resting):
+        averaged = averaged.add(time, values, resting)
+        if not averaged.complete(watch.zeroing):
+            return state._replace(averaged=averaged)
     zero, begun = state.reference, values
     if unknown:  # start at rest in the zero, even if the spindle turns in the reading that ends it
-        begun = robust_mean(gathered.values)
+        begun = averaged.mean
         zero = np.where(np.isnan(zero), begun, zero)
     change = begun - zero
     memory, used = watch.bank.signals(_calmed(watch, change))[0], change[..., heat]
     direct, weights = watch.read_out
     return state._replace(
         reference=zero,
-        gathered=Gathered(),
+        averaged=ZeroMean(),
         time=time,
         memory=memory,
         used=used,

@@ -24,24 +24,13 @@ typedef double tc_real;
 extern "C" {{
 #endif
 
-/* maximum number of readings averaged for the zero (reference); fewer use less memory, and the zero is known earlier */
-#ifndef TC_ZERO_READINGS
-#define TC_ZERO_READINGS {most}
-#endif
-
-#if TC_ZERO_READINGS < 2
-#error "TC_ZERO_READINGS must be at least 2"
-#endif
-
-/* files compiled with different switches do not link */
-#define TC_PASTE(name, readings) name##readings
-#define TC_NAMED(name, readings) TC_PASTE(name, readings)
+/* files compiled in different precisions do not link */
 #ifdef TC_FLOAT
-#define {name}_start TC_NAMED({name}_start_float_, TC_ZERO_READINGS)
-#define {name}_step TC_NAMED({name}_step_float_, TC_ZERO_READINGS)
+#define {name}_start {name}_start_float
+#define {name}_step {name}_step_float
 #else
-#define {name}_start TC_NAMED({name}_start_double_, TC_ZERO_READINGS)
-#define {name}_step TC_NAMED({name}_step_double_, TC_ZERO_READINGS)
+#define {name}_start {name}_start_double
+#define {name}_step {name}_step_double
 #endif
 
 /* inputs, in this order */
@@ -164,7 +153,6 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
         facts=above,
         refused=_REFUSED if double_only else "",
         guard=f"{name.upper()}_H",
-        most=sizes["MOST"],
         inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
         outputs=_enumerated(name, "OUT", [f"{t} [um]" for t in tables.targets]),
         state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside"),

@@ -76,7 +76,7 @@ class _Writer(Printer):
         return f"(tc_real)({text})" if kind == "real" and node.kind == "time" else text
 
     def variable(self, record: str, name: str) -> str:
-        return "TC_ZERO_READINGS" if name == "MOST" else f"c_{name}" if record == "t" else f"{record}->{name}"
+        return f"c_{name}" if record == "t" else f"{record}->{name}"
 
     def choice(self, test: str, one: str, other: str) -> str:
         return f"({test} ? {one} : {other})"
@@ -124,7 +124,7 @@ def _used(owner: str, used: str, before: str) -> dict[str, Var]:
 
 
 def _dims(var: Var, sizes: Mapping[str, int]) -> str:
-    return "".join(f"[{'TC_ZERO_READINGS' if d == 'MOST' else max(sizes[d], 1)}]" for d in var.dims)
+    return "".join(f"[{max(sizes[d], 1)}]" for d in var.dims)
 
 
 def _list(value: Any, var: Var) -> str:

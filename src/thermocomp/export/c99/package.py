@@ -30,14 +30,12 @@ _README = """{facts}
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
 It prints the number of wrong calls (expected: 0), the largest difference, and the size of the state in bytes; its exit
-code is 0 if all results agree. {single}. To save memory, add `-DTC_ZERO_READINGS=60` (at least 2): the zero (reference
-temperatures) is then averaged over fewer readings, may be known earlier, and the test no longer applies. Compile all
-files of your program with the same switches, otherwise they do not link. Never compile with `-ffast-math`.
+code is 0 if all results agree. {single}. Compile all files of your program in the same precision, otherwise they do not
+link. Never compile with `-ffast-math`.
 
 ## Run it
 
-Call it cyclically, every ten seconds, with the time since the previous call, measured or fixed. (With a shorter cycle,
-the single call that computes the zero takes longer: it sorts 300 s / cycle time readings of each input.)
+Call it cyclically, every ten seconds, with the time since the previous call, measured or fixed.
 
     #include "{name}.h"
     #include <math.h>                          /* NAN */

@@ -1,5 +1,6 @@
 """All files of an export to structured text: the blocks, their test, and the instructions."""
 
+import math
 from collections.abc import Sequence
 from typing import get_args
 from uuid import NAMESPACE_URL, uuid5
@@ -8,12 +9,13 @@ from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
 from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
-from thermocomp.export.st.ststatements import Dialect
+from thermocomp.export.st.ststatements import BAGS, Dialect
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
+from thermocomp.runtime.program.variables import RECORDS
 
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
@@ -43,9 +45,7 @@ afterwards.
 
 ## Run it
 
-Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds. With a shorter cycle, the single call
-that computes the zero (reference temperatures) takes longer, since it sorts 300 s / cycle time readings of each input:
-observe the watchdog time of the task. The block needs LREAL.
+Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds. It needs LREAL.
 
 | input | meaning |
 |---|---|
@@ -128,10 +128,9 @@ def write_blocks(
 
 
 def _kilobytes(tables: Tables) -> int:
-    """Return the approximate size of an instance [kB], mainly readings of the zero."""
-    sizes = tables.sizes
-    readings = sizes["MOST"] * (sizes["CHANNELS"] + sizes.get("WATCHED", 0) + 2)
-    return 10 + (8 * (readings + sizes.get("MEMORY", 0) * (sizes["SENSORS"] + 1) + sizes["POINTS"])) // 1000
+    """Return the approximate size of an instance, with its constants [kB]."""
+    variables = [v for bag in BAGS for v in RECORDS[bag].variables().values()]
+    return 1 + 8 * sum(math.prod(tables.sizes.get(d, 0) for d in v.dims) for v in variables) // 1000
 
 
 def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:

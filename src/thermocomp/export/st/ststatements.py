@@ -134,7 +134,7 @@ class _Writer(Printer):
         return f"#{name}" if self._scl else name
 
     def variable(self, record: str, name: str) -> str:
-        return str(self.sizes[name]) if name == "MOST" else f"{self._local(record)}.{safe(name)}"
+        return f"{self._local(record)}.{safe(name)}"
 
     def element(self, array: n.Name, at: Sequence[n.Expression]) -> str:
         index = at[0]

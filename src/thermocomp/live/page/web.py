@@ -55,7 +55,8 @@ def read_token(path: Path) -> str:
         )
     if not token.isprintable() or " " in token:
         raise InputError(
-            f"{path}: expected one token in one line, without blanks or control characters: a browser cannot send others"
+            f"{path}: expected one token in one line, without blanks or control characters; a browser cannot send "
+            "others"
         )
     return token
 

@@ -1,12 +1,12 @@
 """Detection of the dialect of a whole program (LinuxCNC or Fanuc); ambiguous programs are refused.
 
 A *sign* is something that one of the two controls refuses: it is conclusive. A *hint* is a habit of LinuxCNC users:
-text after ``;`` (programs for Fanuc controls end lines with a bare ``;``), unless such a text or a comment has a program
-number or names another control; a comment that LinuxCNC executes or that names LinuxCNC; arcs in several lines that close only if lengths without a decimal point are whole units. It decides
-the meaning of such lengths and of a few other words (`_USUAL`). Signs and hints count before the end of the program:
-LinuxCNC reads nothing after M2, M30 or a closing ``%``, but a Fanuc may. All words that both accept but interpret
-differently (`thermocomp.nc.interpreter.openwords`) are refused for clarification, unless there is a sign of
-LinuxCNC.
+text after ``;`` (programs for Fanuc controls end lines with a bare ``;``), unless such a text or a comment has a
+program number or names another control; a comment that LinuxCNC executes or that names LinuxCNC; arcs in several lines
+that close only if lengths without a decimal point are whole units. It decides the meaning of such lengths and of a few
+other words (`_USUAL`). Signs and hints count before the end of the program: LinuxCNC reads nothing after M2, M30 or a
+closing ``%``, but a Fanuc may. All words that both accept but interpret differently
+(`thermocomp.nc.interpreter.openwords`) are refused for clarification, unless there is a sign of LinuxCNC.
 """
 
 import re

@@ -1,6 +1,5 @@
-"""Means, medians and lags with scalars and loops only, in the array ``column`` of the working memory."""
+"""Sorting, medians, lags and tables as scalars and loops."""
 
-from thermocomp.core.zero import FAR
 from thermocomp.runtime.program.language import (
     choose,
     each,
@@ -15,49 +14,13 @@ from thermocomp.runtime.program.language import (
     repeat_while,
     when,
 )
-from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
+from thermocomp.runtime.program.values import Number, Whole, flag
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 
 @procedure
-def find_mean(s: Kept, w: Work, t: Constants) -> None:
-    """Compute the mean of a column without its outliers in `middle`."""
-    total = let("total", real(0.0))
-    with when(w.rows < 3):
-        for k in each("k", w.rows):
-            total.set(total + w.column[k])
-        w.middle = total / w.rows.real
-    with otherwise():
-        sort(s, w, t)
-        centre = let("centre", (w.column[(w.rows - 1) // 2] + w.column[w.rows // 2]) / 2.0)
-        low = let("low", integer(0))
-        high = let("high", w.rows - 1)
-        apart = let("apart", real(0.0))
-        nearer = let("nearer", real(0.0))
-        # median of the distances from the median: from the outside inwards, the farther end first
-        for _ in each("k", w.rows - w.rows // 2):
-            nearer.set(apart)
-            with when(centre - w.column[low] >= w.column[high] - centre):
-                apart.set(centre - w.column[low])
-                low.set(low + 1)
-            with otherwise():
-                apart.set(w.column[high] - centre)
-                high.set(high - 1)
-        nearer.set(apart)
-        with when((w.rows % 2).equals(0)):
-            nearer.set(larger(centre - w.column[low], w.column[high] - centre))
-        far = let("far", FAR * ((nearer + apart) / 2.0))
-        kept = let("kept", integer(0))
-        for k in each("k", w.rows):
-            with when(abs(w.column[k] - centre) <= far):
-                total.set(total + w.column[k])
-                kept.set(kept + 1)
-        w.middle = total / kept.real
-
-
-@procedure
 def sort(s: Kept, w: Work, t: Constants) -> None:
-    """Sort the array ``column`` in ascending order."""
+    """Sort the array `column` in ascending order."""
     gap = let("gap", w.rows // 2)
     with repeat_while(gap > 0):
         for k in each("k", gap, w.rows):
@@ -84,6 +47,12 @@ def smaller(one: Number, other: Number) -> Number:
 def larger(one: Number, other: Number) -> Number:
     """Return the larger of two numbers."""
     return choose(one > other, one, other)
+
+
+@function
+def median(one: Number, two: Number, three: Number) -> Number:
+    """Return the median of three numbers."""
+    return larger(smaller(one, two), smaller(larger(one, two), three))
 
 
 @function

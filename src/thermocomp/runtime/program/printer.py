@@ -77,7 +77,7 @@ class Printer(ABC):
         match node:
             case n.Numeral(own, value):
                 return self.constant(value, "time" if own == "real" and kind == "time" else own)
-            case n.Name(own, name, "t") if name in self.sizes and name != "MOST":
+            case n.Name(own, name, "t") if name in self.sizes:
                 return self.constant(self.sizes[name], own)
             case n.Name(_, name, ""):
                 return self.local(name)

@@ -10,9 +10,9 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.zero import STANDS
 from thermocomp.runtime.gate import CLOCK_SKEW, DAY
 from thermocomp.runtime.program import watching
+from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
 from thermocomp.runtime.program.language import (
-    choose,
     each,
     exp,
     function,
@@ -22,7 +22,7 @@ from thermocomp.runtime.program.language import (
     procedure,
     when,
 )
-from thermocomp.runtime.program.numbers import find_mean, larger, smaller, sort
+from thermocomp.runtime.program.numbers import larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 
@@ -162,41 +162,31 @@ def take(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def gather(s: Kept, w: Work, t: Constants) -> None:
-    """Add a reading to the zero; once the zero is known, process the earlier readings with the models."""
-    belongs = let("belongs", s.gathered.equals(0))
-    with when(~belongs & (s.gathered < t.MOST) & (w.stands | ~s.resting)):
-        belongs.set(w.now - s.gathered_at[0] <= choose(s.resting, t.at_rest, t.otherwise))
-    before = let("before", s.gathered)
-    s.known = ~belongs
+    """Add a reading to the zero; once the zero is known, advance the models over the earlier readings."""
+    averaged = Averaged.of_models(s)
+    waited = let("waited", s.zero_readings > 0)
+    waiting = let("waiting", s.zero_last - s.zero_first)
+    belongs = averaged.belongs(w, t)
     with when(belongs):
-        with when(s.gathered.equals(0)):
-            s.resting = w.stands
-        s.gathered_at[s.gathered] = w.now
-        for c in each("c", t.CHANNELS):
-            s.gathered_value[s.gathered, c] = w.value[c]
-        s.gathered = s.gathered + 1
-        s.known = (s.gathered >= t.MOST) | (w.now - s.gathered_at[0] >= choose(s.resting, t.at_rest, t.otherwise))
+        averaged.add(w, t.CHANNELS, lambda c: w.value[c])
+    s.known = ~belongs | averaged.complete(t)
     with when(s.known):
-        for c in each("c", t.CHANNELS):
-            w.rows = s.gathered
-            for k in each("k", w.rows):
-                w.column[k] = s.gathered_value[k, c]
-            find_mean(s, w, t)
-            w.mean[c] = w.middle
         for r in each("r", t.RANGES):
             with when(t.rezero[r]):
-                s.zero[r] = w.mean[t.channel[r]]
+                s.zero[r] = s.zero_mean[t.channel[r]]
+        for c in each("c", t.CHANNELS):
+            w.input[c] = s.zero_mean[c]
         last = let("last", w.step)
-        for k in each("k", before):
-            for c in each("c", t.CHANNELS):
-                w.input[c] = w.mean[c]
+        with when(waited):
             w.step = 0.0
-            with when(k > 0):
-                w.step = s.gathered_at[k] - s.gathered_at[k - 1]
+            models_rezeroed(s, w, t)
+        with when(waiting > 0.0):
+            w.step = waiting
             models_rezeroed(s, w, t)
         w.step = last
-        for c in each("c", t.CHANNELS):
-            w.input[c] = choose(belongs, w.mean[c], w.value[c])
+        with when(~belongs):
+            for c in each("c", t.CHANNELS):
+                w.input[c] = w.value[c]
 
 
 @procedure

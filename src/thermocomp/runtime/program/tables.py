@@ -11,7 +11,6 @@ from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
-from thermocomp.core.zero import MOST
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 from thermocomp.runtime.program.models import Formulas
@@ -90,8 +89,7 @@ def gather(compensator: Compensator) -> Tables:
         "TARGETS": len(lines),
         "ENDS_OF_LINES": len(lines) + 1,
         "ENDS": 2,
-        "MOST": MOST if max(zeroing.at_rest, zeroing.otherwise) > 0 else 2,
-        "COLUMN": max(MOST, len(ranges)),
+        "COLUMN": max(len(ranges), len(sensors), 2),  # to sort one, gcc would warn of the index 1
         "has_speed": int(bool(zeroing.speed)),
         **_sizes(values),
         **_watch_sizes(watch),
@@ -225,7 +223,7 @@ def constants_of_watch(watch: Watch, reference: FloatArray | None = None) -> tup
     if reference is None:
         reference = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
     waits, zeroing = np.isnan(reference), watch.zeroing
-    sizes = _watch_sizes(watch) | {"CHANNELS": len(watch.inputs), "MOST": MOST, "COLUMN": max(MOST, len(watch.sensors))}
+    sizes = _watch_sizes(watch) | {"CHANNELS": len(watch.inputs), "COLUMN": len(watch.sensors)}
     values = _watch(watch, {name: k for k, name in enumerate(i.name for i in watch.inputs)}) | {
         "at_rest": zeroing.at_rest,
         "otherwise": zeroing.otherwise,

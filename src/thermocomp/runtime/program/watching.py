@@ -4,6 +4,7 @@ from thermocomp.core.watch import FASTER, LASTING
 from thermocomp.runtime.blame import USUAL
 from thermocomp.runtime.gate import DAY, PLAUSIBLE
 from thermocomp.runtime.program import blaming
+from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.language import (
     choose,
     each,
@@ -15,7 +16,7 @@ from thermocomp.runtime.program.language import (
     raised,
     when,
 )
-from thermocomp.runtime.program.numbers import find_mean, follow, larger, smaller, sort
+from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import FADE, GOOD, HEATS, MISSING, REST, RETURN, TICK
@@ -79,29 +80,18 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
 @procedure
 def begin(s: Kept, w: Work, t: Constants) -> None:
     """Add a reading to the zero if it is unknown; start from rest at the zero, or at the first reading."""
-    belongs = let("belongs", t.watch_waits & s.watch_gathered.equals(0))
-    with when(t.watch_waits & ~belongs & (s.watch_gathered < t.MOST) & (w.stands | ~s.watch_resting)):
-        belongs.set(w.now - s.watch_gathered_at[0] <= choose(s.watch_resting, t.at_rest, t.otherwise))
-    ready = let("ready", ~belongs)
-    with when(belongs):
-        with when(s.watch_gathered.equals(0)):
-            s.watch_resting = w.stands
-        s.watch_gathered_at[s.watch_gathered] = w.now
-        for k in each("k", t.WATCHED):
-            s.watch_gathered_value[s.watch_gathered, k] = w.value[t.watch_channel[k]]
-        s.watch_gathered = s.watch_gathered + 1
-        ready.set(
-            (s.watch_gathered >= t.MOST)
-            | (w.now - s.watch_gathered_at[0] >= choose(s.watch_resting, t.at_rest, t.otherwise))
-        )
+    averaged = Averaged.of_watch(s)
+    ready = let("ready", ~t.watch_waits)
+    with when(t.watch_waits):
+        belongs = averaged.belongs(w, t)
+        with when(belongs):
+            averaged.add(w, t.WATCHED, lambda k: w.value[t.watch_channel[k]])
+        ready.set(~belongs | averaged.complete(t))
     with when(ready):
         for k in each("k", t.WATCHED):
             w.middle = w.value[t.watch_channel[k]]
             with when(t.watch_waits):
-                w.rows = s.watch_gathered
-                for m in each("m", w.rows):
-                    w.column[m] = s.watch_gathered_value[m, k]
-                find_mean(s, w, t)
+                w.middle = s.watch_mean[k]
             s.watch_zero[k] = choose(t.watch_rezero[k], w.middle, t.watch_reference[k])
             w.change[k] = w.middle - s.watch_zero[k]
         for i in each("i", t.SENSORS):
