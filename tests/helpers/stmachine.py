@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from blark import transform as b
-from stparsing import PYTHON, Array, Block, Type, block_of, declared
+from stparsing import PYTHON, Array, Block, Piece, Type, block_of, declared
 
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
 from thermocomp.export.vectors import Answers, Readings, replay
@@ -136,29 +136,35 @@ class _Function:
     def source(self) -> str:
         given = "self" if self._is_block else ", ".join(self._given)
         lines = [f"def {self._name}({given}):"]
-        for piece in self._body:
-            self._written = piece.written
-            lines += self._block_of(piece.tree, 1)
+        lines += self._block_of(self._body, 1)
         if not self._is_block:
             lines += [f"    return {self._name}_"] if self._types[self._name] == "LREAL" else ["    return False"]
         return "\n".join(lines)
 
-    def _block_of(self, body: Any, depth: int) -> list[str]:
-        statements = body.statements if body else []
-        return [line for s in statements for line in self._statement(s, depth)] or ["    " * depth + "pass"]
+    def _block_of(self, body: Sequence[Piece], depth: int) -> list[str]:
+        lines, outer = list[str](), self._written
+        for piece in body:
+            self._written = piece.written
+            lines += self._statement(piece.tree, piece.bodies, depth)
+        self._written = outer
+        return lines or ["    " * depth + "pass"]
+
+    def _named(self, name: Any) -> str:
+        """Return the name that stands where another was parsed."""
+        return self._written.get(str(name), str(name))
 
     def _instance(self, s: Any, pad: str) -> list[str]:
         """Return a call of an instance of a function block."""
         name, kind = self._value(s.name)
         head = self._machine.head(kind)
-        assert [str(p.name) for p in s.parameters] == list(head["in"]), s
+        assert [self._named(p.name) for p in s.parameters] == list(head["in"]), s
         lines = []
         for p, (parameter, wanted) in zip(s.parameters, head["in"].items(), strict=True):
             value = self._as(p.value, wanted)
             lines.append(f"{pad}{name}.{parameter} = {f'Array({value})' if isinstance(wanted, tuple) else value}")
         return [*lines, f"{pad}{kind}({name})"]
 
-    def _statement(self, s: Any, depth: int) -> list[str]:
+    def _statement(self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int) -> list[str]:
         pad = "    " * depth
         match s:
             case b.AssignmentStatement():
@@ -167,19 +173,17 @@ class _Function:
                 assert kind == given, f"{s}: {given} for {kind}"
                 return [f"{pad}{target} = {value}"]
             case b.IfStatement():
-                lines = [f"{pad}if {self._as(s.if_expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
-                for other in s.else_ifs:
-                    lines += [f"{pad}elif {self._as(other.if_expression, 'BOOL')}:"]
-                    lines += self._block_of(other.statements, depth + 1)
-                if s.else_clause:
-                    lines += [f"{pad}else:", *self._block_of(s.else_clause.statements, depth + 1)]
-                return lines
+                tests = [s.if_expression, *(other.if_expression for other in s.else_ifs)]
+                heads = [f"{pad}{'el' * (k > 0)}if {self._as(t, 'BOOL')}:" for k, t in enumerate(tests)]
+                heads += [f"{pad}else:"] if s.else_clause else []
+                inner = [self._block_of(body, depth + 1) for body in bodies]
+                return [line for head, lines in zip(heads, inner, strict=True) for line in (head, *lines)]
             case b.ForStatement():
                 begin, end = self._as(s.from_, "DINT"), self._as(s.to, "DINT")
                 target = self._value(s.control)[0]
-                return [f"{pad}for {target} in range({begin}, {end} + 1):", *self._block_of(s.statements, depth + 1)]
+                return [f"{pad}for {target} in range({begin}, {end} + 1):", *self._block_of(bodies[0], depth + 1)]
             case b.WhileStatement():
-                return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
+                return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(bodies[0], depth + 1)]
             case b.FunctionCallStatement() | b.FunctionCall():
                 if str(s.name.name) in self._types:
                     return self._instance(s, pad)
@@ -206,7 +210,7 @@ class _Function:
             case b.Real():
                 return repr(float(self._number(node.value))), "LREAL"
             case b.SimpleVariable():
-                name = self._written.get(str(node.name), str(node.name))
+                name = self._named(node.name)
                 if name == self._name:
                     return f"{name}_", self._types[name]
                 return (f"self.{name}" if self._is_block else name), self._types[name]
@@ -214,7 +218,7 @@ class _Function:
                 text, kind = self._value(node.name)
                 for element in node.elements:
                     if isinstance(element, b.FieldSelector):
-                        member = str(element.field.name)
+                        member = self._named(element.field.name)
                         text, kind = f"{text}.{member}", self._machine.kind_of(kind, member)
                     else:
                         assert kind[0] == "ARRAY", node
@@ -266,7 +270,7 @@ class _Function:
             return f"SEL({self._as(values[0], 'BOOL')}, {one}, {other})", kind
         head = self._machine.head(name)
         wanted = {**head["inout"], **head["in"]}
-        assert [str(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
+        assert [self._named(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
         texts = [self._as(v, kind) for v, kind in zip(values, wanted.values(), strict=True)]
         return f"{name}({', '.join(texts)})", head["gives"]
 

@@ -1,0 +1,376 @@
+"""Compensators drawn from a seed: models of every family on a machine of a few temperatures, speeds and other values."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from driftmodels import ACCEPTED
+from drawnwatch import draw_lost, draw_watch
+from numpy.typing import NDArray
+
+from thermocomp.core.additive import Additive
+from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
+from thermocomp.core.correction import Limits
+from thermocomp.core.curves import Curve
+from thermocomp.core.inputs import Input, Support
+from thermocomp.core.joint import JointSupport
+from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.network import Affine, Network, Perceptron
+from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
+from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.position import PositionModel
+from thermocomp.core.terms import Variable
+from thermocomp.core.zero import FIRST_READING, Zeroing
+from thermocomp.runtime.compensator import Compensator
+
+FloatArray = NDArray[np.float64]
+Rng = np.random.Generator
+
+#: highest trained speed [1/min]
+TOP = 5000.0
+SPEED, TACHOMETER = "n_rpm", "tacho_rpm"
+HEATER = Input(SPEED, "spindle_speed", "1/min", 0.0, rezero=False, low=0.0, high=TOP)
+#: other inputs of models: quantity, unit, trained range
+OTHERS = {
+    "c_rpm": ("spindle_speed", "1/min", 0.0, 3000.0),
+    "d_um": ("displacement", "um", -20.0, 30.0),
+    "p_mm": ("position", "mm", -300.0, 300.0),
+    "load": ("dimensionless", "1", 0.0, 1.0),
+}
+
+
+class Plant(NamedTuple):
+    """The machine: temperatures follow the heat of its spindle and the room."""
+
+    zero: FloatArray  #: (n_temperatures,), at the start [degC]
+    heat: FloatArray  #: (n_temperatures,), rise at the highest speed [degC]
+    room: FloatArray  #: (n_temperatures,), share of the change of the room [-]
+    power: float  #: exponent of the fraction of the highest speed
+    slow: float  #: time constant of the heat at rest [s]
+    fast: float  #: at the highest speed [s]
+
+
+class Drawn(NamedTuple):
+    """A compensator, and the machine on which it runs."""
+
+    compensator: Compensator
+    plant: Plant
+
+
+def draw_compensator(seed: int) -> Drawn:
+    """Return a compensator; seeds in a row take turns at families, policies, watches and positions."""
+    rng, zeroing = np.random.default_rng((1, seed)), ZEROINGS[seed % len(ZEROINGS)]
+    plant = draw_plant(rng)
+    inputs = draw_inputs(rng, plant)
+    watch = draw_watch(rng, plant, inputs, HEATER, zeroing) if seed % 4 else None
+    models: list[ErrorModel] = []
+    for k in range(int(rng.integers(1, 6))):
+        if models and rng.random() < 0.3:  # steps together with the one before
+            model = _resized(models[-1], float(rng.uniform(0.3, 1.7)))
+        else:
+            family = FAMILIES[(seed + k) % len(FAMILIES)]
+            model = draw_model(rng, family, _pick(rng, inputs), SUPPORTS[(seed // 2 + k) % len(SUPPORTS)])
+        lost = draw_lost(rng, model, watch)
+        refused = k > 0 and rng.random() < 0.15
+        honest = replace(ACCEPTED, lost=lost, verdict="refused" if refused else "accepted")
+        known = watch if k == 0 or rng.random() < 0.8 else None
+        models.append(replace(model, target=f"e{k}_um", zeroing=zeroing, watch=known, honest_error=honest))
+    limits = draw_limits(rng)
+    return Drawn(Compensator.of(draw_sources(rng, models), limits, watching=True), plant)
+
+
+#: how a zero is averaged: the first reading, or more, with and without a channel that shows whether the spindle stands
+ZEROINGS = (
+    Zeroing(300.0, 10.0, SPEED),
+    FIRST_READING,
+    Zeroing(120.0, 40.0, TACHOMETER),
+    Zeroing(0.0, 60.0, SPEED),
+    Zeroing(100.0, 100.0),
+)
+SUPPORTS = tuple(
+    Support(policy, margin, over)  # type: ignore[arg-type]
+    for policy, margin, over in (
+        ("clip", 0.25, 0.5),
+        ("hold", 0.1, 0.5),
+        ("fade", 0.25, 2.0),
+        ("clip", 1.0, 0.5),
+        ("fade", 0.0, 0.3),
+        ("hold", 0.5, 0.5),
+        ("clip", 0.0, 0.5),
+    )
+)
+
+
+def draw_plant(rng: Rng) -> Plant:
+    """Return a machine of one to five temperatures."""
+    n = int(rng.integers(1, 6))
+    slow = float(rng.uniform(1800.0, 6000.0))
+    return Plant(
+        zero=20.0 + rng.uniform(-8.0, 8.0) + rng.uniform(-2.0, 2.0, n),
+        heat=rng.uniform(2.0, 14.0, n) * np.where(rng.random(n) < 0.2, 0.2, 1.0),
+        room=rng.uniform(0.4, 1.2, n),
+        power=float(rng.uniform(0.7, 2.0)),
+        slow=slow,
+        fast=float(rng.uniform(0.3, 1.0)) * slow,
+    )
+
+
+def draw_inputs(rng: Rng, plant: Plant) -> tuple[Input, ...]:
+    """Return what the models of a machine may read: temperatures, usually a speed, and more."""
+    mode = rng.choice(["all", "none", "some"], p=[0.5, 0.2, 0.3])
+    found = []
+    for k, heat in enumerate(plant.heat.tolist()):
+        rezero = mode == "all" or (mode == "some" and bool(rng.random() < 0.5))
+        room = float(rng.uniform(0.5, 4.0)) + (0.0 if rezero else 9.0)
+        low, high = -room, float(rng.choice([0.5, 1.0, 1.2])) * heat + room
+        found.append(Input(f"t{k}_C", "temperature", "degC", 20.0, rezero, low, high))
+    if rng.random() < 0.8:
+        found.append(Input(SPEED, "spindle_speed", "1/min", 0.0, bool(rng.random() < 0.05), 0.0, TOP))
+    for name, (quantity, unit, low, high) in OTHERS.items():
+        if rng.random() < 0.2:
+            rezero = bool(rng.random() < 0.3)
+            at = float(rng.uniform(low, high)) if rng.random() < 0.5 else 0.0
+            width = 0.0 if rng.random() < 0.1 else 1.0  # one that did not move
+            found.append(Input(name, quantity, unit, at, rezero, width * (low - at), width * (high - at)))
+    return tuple(found)
+
+
+def _pick(rng: Rng, inputs: Sequence[Input]) -> tuple[Input, ...]:
+    """Return the inputs of a model: all or some, a few with another trained range than in the other models."""
+    kept = [i for i in inputs if rng.random() < 0.7] if rng.random() < 0.5 else list(inputs)
+    kept = kept or [inputs[0]]
+    if rng.random() < 0.3:
+        rng.shuffle(kept)  # type: ignore[arg-type]
+    if rng.random() < 0.2:
+        k = int(rng.integers(len(kept)))
+        kept[k] = replace(kept[k], low=0.6 * kept[k].low, high=1.1 * kept[k].high)
+    return tuple(kept)
+
+
+def size_of(channel: Input) -> float:
+    """Return by how much an input changes."""
+    return max(abs(channel.low), abs(channel.high), 0.1)
+
+
+# -- models ------------------------------------------------------------------------------------------------------------
+
+
+def draw_model(rng: Rng, family: str, inputs: tuple[Input, ...], support: Support) -> ErrorModel:
+    """Return a model whose deviations are some tens of micrometres."""
+    intercept = float(rng.choice([0.0, rng.normal(0.0, 2.0)]))
+    head = {"target": "z", "unit": "um", "inputs": inputs, "intercept": intercept, "support": support}
+    joint = draw_joint(rng, inputs) if rng.random() < 0.5 else None
+    return MAKERS[family](rng, head | {"joint": joint}, inputs)
+
+
+def draw_limits(rng: Rng) -> Limits:
+    """Return limits, narrow ones more often than those that a machine has."""
+    magnitude, rate, dead_band, age, hold, fade = (
+        float(rng.choice(of))
+        for of in (
+            [4.0, 25.0, 25.0, 1e9],
+            [0.004, 0.05, 0.5, 1e9],
+            [0.0, 0.0, 0.25, 2.0],
+            [5.0, 60.0, 60.0, 600.0],
+            [3.0, 120.0, 1800.0],
+            [20.0, 600.0, 3600.0],
+        )
+    )
+    return Limits(magnitude=magnitude, rate=rate, dead_band=dead_band, reading_age=age, hold=hold, fade=fade)
+
+
+def draw_sources(rng: Rng, models: Sequence[ErrorModel]) -> list[ErrorModel | PositionModel]:
+    """Return what a compensator is made of: models, and some of them as offset and slopes along an axis."""
+    found, rest = list[ErrorModel | PositionModel](), list(models)
+    while rest:
+        count = int(rng.integers(1, min(len(rest), 3) + 1)) if rng.random() < 0.5 else 0
+        if not count:
+            found.append(rest.pop(0))
+            continue
+        mine, rest = rest[:count], rest[count:]
+        offset = mine.pop(0) if len(mine) == count and rng.random() < 0.7 else None
+        slopes = tuple(replace(m, unit=("um/m", "um/m^2", "um/m^3")[k]) for k, m in enumerate(mine))
+        low = float(rng.uniform(-400.0, 0.0))
+        found.append(
+            PositionModel(
+                target=models[0].target.replace("e0", f"p{len(found)}"),
+                unit="um",
+                axis="X",
+                travel=(low, low + float(rng.uniform(100.0, 900.0))),
+                reference_position=float(rng.choice([0.0, 120.0])),
+                offset=offset,
+                slopes=slopes,
+            )
+        )
+    return found
+
+
+def draw_joint(rng: Rng, inputs: Sequence[Input]) -> JointSupport | None:
+    """Return the states of a training, in which not all inputs need take part."""
+    speeds = tuple(k for k, i in enumerate(inputs) if i.quantity == "spindle_speed")
+    columns = tuple(k for k, i in enumerate(inputs) if k not in speeds and rng.random() < 0.8)
+    if not speeds and not columns:
+        return None
+    scale = tuple(0.3 * size_of(inputs[k]) for k in columns)
+    ranges = np.array([[inputs[k].low, inputs[k].high] for k in columns]).reshape(-1, 2)
+    points = rng.uniform(*ranges.T, (int(rng.integers(1, 8)), len(columns))) / np.array(scale)
+    return JointSupport(
+        columns=columns,
+        scale=scale,
+        points=tuple(map(tuple, points.tolist())) if columns else (),
+        limit=float(rng.uniform(0.5, 2.0)),
+        speeds=speeds,
+        levels=tuple((0.0, 0.6 * TOP, TOP)[: int(rng.integers(1, 4))] for _ in speeds),
+        tolerances=tuple(float(rng.uniform(200.0, 2000.0)) for _ in speeds),
+    )
+
+
+def _weights(rng: Rng, count: int, size: float = 8.0) -> tuple[float, ...]:
+    return tuple(rng.normal(0.0, size, count).tolist())
+
+
+def _variables(rng: Rng, inputs: Sequence[Input]) -> tuple[tuple[Variable, ...], list[float]]:
+    """Return linear combinations of the inputs, and how far they move."""
+    found = [Variable.single(i.name, k) for k, i in enumerate(inputs)]
+    sizes = [size_of(i) for i in inputs]
+    heat = [k for k, i in enumerate(inputs) if i.quantity == "temperature"]
+    if len(heat) > 1:
+        a, b = rng.choice(heat, 2, replace=False).tolist()
+        found.append(Variable("a-b", ((a, 1.0), (b, -1.0))))
+        sizes.append(max(sizes[a], sizes[b]))
+    weights = tuple((k, float(rng.normal(0.0, 1.0)) / s) for k, s in enumerate(sizes[: len(inputs)]))
+    return (*found, Variable("p", weights)), [*sizes, 1.0]
+
+
+def _polynomial(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    variables, sizes = _variables(rng, inputs)
+    each = rng.integers(0, len(variables), (6, 3)).tolist()
+    terms = tuple(tuple(t[: int(rng.integers(1, 4))]) for t in each)
+    coefficients = tuple(float(rng.normal(0.0, 8.0)) / float(np.prod([sizes[v] for v in t])) for t in terms)
+    return Polynomial(**head, variables=variables, terms=terms, coefficients=coefficients)
+
+
+def _lags(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    signals = [(k,) for k in range(len(inputs))] + [tuple(rng.integers(0, len(inputs), 2).tolist())]
+    sizes = [float(np.prod([size_of(inputs[k]) for k in s])) for s in signals]
+    follows = rng.integers(0, len(signals), int(rng.integers(1, 5))).tolist()
+    return LinearDynamic(
+        **head,
+        signals=tuple(signals),
+        direct=tuple(float(rng.normal(0.0, 3.0)) / s for s in sizes),
+        lag_signals=tuple(follows),
+        time_constants=tuple(rng.choice([20.0, 300.0, 1800.0, 9000.0], len(follows)).tolist()),
+        lagged=tuple(float(rng.normal(0.0, 6.0)) / sizes[k] for k in follows),
+    )
+
+
+def _paced(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    heat = [k for k, i in enumerate(inputs) if i.quantity != "spindle_speed"]
+    turns = [k for k, i in enumerate(inputs) if i.quantity == "spindle_speed"]
+    taus = tuple(rng.uniform(60.0, 5000.0, int(rng.integers(0, 3))).tolist())
+    states = []
+    for k in turns * int(rng.integers(1, 3)):
+        slow = float(rng.uniform(300.0, 6000.0))
+        running = slow * float(rng.uniform(0.2, 1.0))
+        states.append(SpeedState(k, float(rng.choice([0.5, 1.0, 1.7, 3.0])), slow, running, float(rng.normal(0.0, 9.0))))
+    temperatures = [
+        LaggedInput(k, float(rng.normal(0.0, 3.0)) / size_of(inputs[k]), _weights(rng, len(taus), 5.0 / size_of(inputs[k])))
+        for k in heat
+    ]
+    parts = len(heat) * (1 + len(taus)) + len(states)
+    spread = tuple(_weights(rng, parts, 0.3) for _ in range(int(rng.integers(0, 3))))
+    return PacedDynamic(
+        **head,
+        time_constants=taus,
+        temperatures=tuple(temperatures),
+        top_speed=TOP,
+        states=tuple(states),
+        spread=spread,
+    )
+
+
+def _curve(rng: Rng, size: float, kind: str) -> Curve:
+    x = np.sort(rng.uniform(-0.5, 1.2, int(rng.integers(1, 6))) * size)
+    return Curve(tuple(x.tolist()), _weights(rng, len(x) + (kind == "step")), kind)  # type: ignore[arg-type]
+
+
+def _additive(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    variables, sizes = _variables(rng, inputs)
+    curves = tuple(_curve(rng, s, str(rng.choice(["linear", "linear", "step"]))) for s in sizes)
+    response = _curve(rng, 20.0, "linear") if rng.random() < 0.5 else None
+    return Additive(**head, variables=variables, curves=curves, response=response)
+
+
+def _net(rng: Rng, count: int, output: Sequence[str]) -> Perceptron:
+    hidden = int(rng.integers(1, 4))
+    return Perceptron(
+        tuple(_weights(rng, count, 1.0) for _ in range(hidden)),
+        _weights(rng, hidden, 1.0),
+        (_weights(rng, hidden, 1.0),),
+        _weights(rng, 1, 0.5),
+        str(rng.choice(["sigmoid", "tanh", "identity"])),  # type: ignore[arg-type]
+        str(rng.choice(output)),  # type: ignore[arg-type]
+    )
+
+
+def _network(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    gains = tuple(1.0 / size_of(i) for i in inputs)
+    return Network(
+        **head,
+        net=_net(rng, len(inputs), ("sigmoid", "tanh", "identity")),
+        input_scaling=Affine(gains, _weights(rng, len(gains), 0.3)),
+        output_scaling=Affine((float(rng.uniform(5.0, 30.0)),), (-7.0,)),
+    )
+
+
+INTERVALS = (0.5, 7.0, 15.0, 60.0, 900.0)
+
+
+def _ticks(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    more = int(rng.integers(0, 3))
+    return Autoregressive(
+        **head,
+        interval=float(rng.choice(INTERVALS)),
+        a=((0.7,), (0.5, 0.3), (), (1.2, -0.35))[int(rng.integers(4))],
+        b=tuple(_weights(rng, more + 1, 2.0 / size_of(i)) for i in inputs),
+    )
+
+
+def _ticking_net(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+    k, m = int(rng.integers(0, 3)), int(rng.integers(0, 3))
+    gains = (0.004,) * k + tuple(1.0 / size_of(i) for i in inputs) * (m + 1)
+    return AutoregressiveNet(
+        **head,
+        interval=float(rng.choice(INTERVALS)),
+        k=k,
+        m=m,
+        net=_net(rng, len(gains), ("sigmoid", "tanh")),
+        input_scaling=Affine(gains, _weights(rng, len(gains), 0.3)),
+        output_scaling=Affine((30.0,), (-15.0,)),
+    )
+
+
+MAKERS: dict[str, Callable[[Rng, dict[str, Any], Sequence[Input]], ErrorModel]] = {
+    "polynomial": _polynomial,
+    "linear-dynamic": _lags,
+    "paced-dynamic": _paced,
+    "additive": _additive,
+    "network": _network,
+    "autoregressive": _ticks,
+    "autoregressive-network": _ticking_net,
+}
+FAMILIES = tuple(MAKERS)
+
+
+def _resized(model: ErrorModel, factor: float) -> ErrorModel:
+    """Return a model of the same inputs and memory with another output."""
+    match model:
+        case Polynomial():
+            return replace(model, coefficients=tuple(factor * c for c in model.coefficients))
+        case LinearDynamic():
+            return replace(model, lagged=tuple(factor * c for c in model.lagged))
+        case PacedDynamic():
+            return replace(model, states=tuple(replace(s, weight=factor * s.weight) for s in model.states))
+    return replace(model, intercept=model.intercept + factor)
