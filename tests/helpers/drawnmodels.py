@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet
+from thermocomp.core.band import Band
 from thermocomp.core.correction import Limits
 from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input, Support
@@ -73,7 +74,7 @@ def draw_compensator(seed: int) -> Drawn:
             family = FAMILIES[(seed + k) % len(FAMILIES)]
             model = draw_model(rng, family, _pick(rng, inputs), SUPPORTS[(seed // 2 + k) % len(SUPPORTS)])
         lost = draw_lost(rng, model, watch)
-        refused = k > 0 and rng.random() < 0.15
+        refused = k > 0 and (seed + k) % 6 == 5
         honest = replace(ACCEPTED, lost=lost, verdict="refused" if refused else "accepted")
         known = watch if k == 0 or rng.random() < 0.8 else None
         models.append(replace(model, target=f"e{k}_um", zeroing=zeroing, watch=known, honest_error=honest))
@@ -252,7 +253,7 @@ def _polynomial(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> Erro
     return Polynomial(**head, variables=variables, terms=terms, coefficients=coefficients)
 
 
-def _lags(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> ErrorModel:
+def _lags(rng: Rng, head: dict[str, Any], inputs: Sequence[Input]) -> LinearDynamic:
     signals = [(k,) for k in range(len(inputs))] + [tuple(rng.integers(0, len(inputs), 2).tolist())]
     sizes = [float(np.prod([size_of(inputs[k]) for k in s])) for s in signals]
     follows = rng.integers(0, len(signals), int(rng.integers(1, 5))).tolist()
@@ -374,3 +375,47 @@ def _resized(model: ErrorModel, factor: float) -> ErrorModel:
         case PacedDynamic():
             return replace(model, states=tuple(replace(s, weight=factor * s.weight) for s in model.states))
     return replace(model, intercept=model.intercept + factor)
+
+
+# -- of models that run on their own -----------------------------------------------------------------------------------
+
+
+def draw_alone(seed: int) -> Drawn:
+    """Return a compensator of one model, with a band, over the inputs of a drawn machine."""
+    drawn, rng = draw_compensator(seed), np.random.default_rng((3, seed))
+    first, own = drawn.compensator.models[0], drawn.compensator
+    speeds = tuple(k for k, i in enumerate(first.inputs) if i.quantity == "spindle_speed")
+    band = Band(
+        level=0.9,
+        basis="assumption",
+        cycles=5,
+        floor=0.7,
+        running=2.0,
+        stopped=1.5,
+        speeds=speeds if rng.random() < 0.5 else (),
+    )
+    model = replace(first, unit="um", target="z_um", band=band if rng.random() < 0.8 else None)
+    return Drawn(Compensator.of([model], own.limits), drawn.plant)
+
+
+def draw_fleet(seed: int) -> tuple[LinearDynamic, Limits, Plant]:
+    """Return a model of which many machines may run, and limits of their corrections."""
+    rng = np.random.default_rng((4, seed))
+    plant = draw_plant(rng)
+    inputs = draw_inputs(rng, plant)
+    support = Support("clip", float(rng.choice([0.0, 0.25])))
+    head = {"target": "z_um", "unit": "um", "inputs": inputs, "support": support, "honest_error": ACCEPTED}
+    model, n = _lags(rng, head, inputs), len(inputs)
+    straight = rng.random() < 0.3  # one lag after each input
+    count = n if straight else int(rng.integers(1, 5))
+    follows = list(range(n)) if straight else rng.integers(0, n, count).tolist()
+    single = replace(
+        model,
+        signals=model.signals[:n],
+        direct=model.direct[:n],
+        lag_signals=tuple(follows),
+        time_constants=tuple(rng.choice([20.0, 300.0, 1800.0], count).tolist()),
+        lagged=tuple(float(rng.normal(0.0, 6.0)) / size_of(inputs[k]) for k in follows),
+        intercept=float(rng.normal(0.0, 1.0)),
+    )
+    return single, draw_limits(rng), plant
