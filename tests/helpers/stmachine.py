@@ -5,7 +5,6 @@ number of 32 bits that overflows and a variable that is read before it is set ar
 """
 
 import math
-import re
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -35,7 +34,7 @@ class Machine:
     def __init__(self, units: Sequence[SourceUnit]) -> None:
         self._structs = {u.name: declared(u.declaration) for u in units if not u.end}
         blocks = [block_of(u) for u in units if u.end]
-        self._heads = {str(block.head.name): _head(block) for block in blocks}
+        self._heads = {block.name: _head(block) for block in blocks}
         self._space: dict[str, Any] = {
             "Array": Array,
             "SEL": lambda g, one, other: other if g else one,
@@ -44,7 +43,7 @@ class Machine:
         }
         for block in blocks:
             exec(_Function(self, block).source(), self._space)
-        self._name = str(blocks[-1].head.name)
+        self._name = blocks[-1].name
         self.start()
 
     def start(self) -> None:
@@ -90,44 +89,25 @@ def _trunc(value: float) -> int:
     return int(value)
 
 
+_SECTIONS = {"VAR_INPUT": "in", "VAR_IN_OUT": "inout", "VAR_OUTPUT": "out", "VAR": "own"}
+
+
 def _head(block: Block) -> dict[str, Any]:
-    """Return names and types of a block's variables, by section."""
-    found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}}
-    words = {
-        b.InputDeclarations: "in",
-        b.InputOutputDeclarations: "inout",
-        b.OutputDeclarations: "out",
-        b.VariableDeclarations: "own",
-        b.FunctionVariableDeclarations: "own",
-    }
-    for section in block.head.declarations:
-        for item in section.items:
-            kind = _type(str(item.init).split(":=")[0])
-            for variable in item.variables:
-                found[words[type(section)]][str(variable.variable if hasattr(variable, "variable") else variable)] = (
-                    kind
-                )
-    if block.numbered:
-        del found["own"]["v1"]
-        found["own"] |= dict.fromkeys(block.numbered, "LREAL")
-    returned = getattr(block.head, "return_type", None)
-    found["gives"] = str(returned) if returned is not None else None
+    """Return names and types of a block's variables, by section, and what a function gives."""
+    found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}, "gives": block.gives or None}
+    for section, name, kind in block.variables:
+        found[_SECTIONS[section]][name] = kind
     return found
-
-
-def _type(text: str) -> Type:
-    sized = re.fullmatch(r"ARRAY ?\[0\.\.(\d+)\] OF (\w+)", text.strip())
-    return ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else text.strip()
 
 
 class _Function:
     """Writes a block as Python."""
 
     def __init__(self, machine: Machine, block: Block) -> None:
-        self._machine, self._body, self._name = machine, block.body, str(block.head.name)
+        self._machine, self._body, self._name = machine, block.body, block.name
         self._written: dict[str, str] = {}
         head = machine.head(self._name)
-        self._is_block = isinstance(block.head, b.FunctionBlock)
+        self._is_block = not block.gives
         self._types: dict[str, Type] = {**head["in"], **head["inout"], **head["out"], **head["own"]}
         self._given = [*head["inout"], *head["in"]]
         if not self._is_block:
@@ -185,7 +165,7 @@ class _Function:
             case b.WhileStatement():
                 return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(bodies[0], depth + 1)]
             case b.FunctionCallStatement() | b.FunctionCall():
-                if str(s.name.name) in self._types:
+                if self._named(s.name.name) in self._types:
                     return self._instance(s, pad)
                 return [f"{pad}{self._value(s)[0]}"]
         raise TypeError(f"{type(s)}: {s}")
@@ -252,7 +232,7 @@ class _Function:
         return f"({one} {op} {other})", kind
 
     def _call(self, node: Any) -> tuple[str, Type]:
-        name, given = str(node.name.name), node.parameters
+        name, given = self._named(node.name.name), node.parameters
         values = [p.value for p in given]
         if name in _NUMBERS:
             return f"{name}({self._as(values[0], 'LREAL')})", "LREAL"
