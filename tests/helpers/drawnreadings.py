@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from drawnmodels import OTHERS, SPEED, TACHOMETER, TOP, Drawn, Plant
+from drawnfamilies import TOP
+from drawnmodels import OTHERS, SPEED, TACHOMETER, Drawn, Plant
 from numpy.typing import NDArray
 
 from thermocomp.core.bounds import GAP
@@ -21,6 +22,7 @@ DAY = 86400.0
 GRID = 1.0 / 64.0
 #: a clock is set by so much [s]: far more than any source is silent
 SET = 2.0**25
+MANY = 670
 #: what no sensor of a sound machine reads, and limits at which a decision turns
 WILD = (np.nan, np.inf, -np.inf, 1e30, -1e30, 1.1e30, 1e31, -1e308, -0.0, 85.0, -127.0, 150.0, -40.0, 65535.0)
 SPEEDS = (np.nan, 65535.0, 6e5, -6e5, 5e5, 1.03 * TOP, -0.5 * TOP, 10.0, -10.0, 10.5, 2.6 * TOP, np.inf)
@@ -48,16 +50,19 @@ def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
     channels = gather(drawn.compensator).channels
     steady = seed % 3 == 0  # readings of one age: only then a clock that is set is as one that is not
     dt = draw_steps(rng, count, limits, exact=steady or rng.random() < 0.6)
+    rest = MANY if seed % 10 == 5 else 0  # more readings at rest than a zero is averaged of
+    dt[:rest] = 0.125
     time = np.cumsum(np.where((dt >= 0.0) & (dt <= GAP), dt, 0.0))
     restarts = rng.random(count) < rng.choice([0.0, 0.5 / count, 3.0 / count])
-    values = draw_values(rng, drawn.plant, channels, time)
+    values = draw_values(rng, drawn.plant, channels, time, rest)
     for damage in rng.choice(np.array(DAMAGES, dtype=object), int(rng.integers(0, 7))):
         with np.errstate(invalid="ignore"):  # infinity less infinity
             damage(rng, values, channels)
     age = draw_ages(rng, dt, limits, steady=steady)
     clock, resumed = np.zeros(count), np.zeros(count, dtype=np.bool_)
     if steady:
-        clock = SET * np.cumsum(rng.choice([0.0, 1.0, -1.0], count, p=[0.99, 0.005, 0.005])) + rng.choice([0.0, 2.0**31])
+        sets = rng.choice([0.0, 1.0, -1.0], count, p=[0.99, 0.005, 0.005])
+        clock = SET * np.cumsum(sets) + rng.choice([0.0, 2.0**31])
         resumed = (rng.random(count) < 3.0 / count) & (dt > 0.0) & (dt <= GAP)
     return Stream(values, age, dt, clock, restarts, rng.random(count) < 4.0 / count, resumed & ~restarts)
 
@@ -87,17 +92,20 @@ def draw_ages(rng: Rng, dt: FloatArray, limits: Limits, *, steady: bool) -> Floa
     never = [most + GRID, 2.0 * most, -1.0 - GRID, -30.0, np.nan, np.inf, -np.inf, 1e12]
     late = [0.0, -0.5, -1.0, most, 0.5 * most, most - 1.0, float(rng.uniform(0.0, most)), 1.0 + np.nan_to_num(dt[-1])]
     age[odd] = rng.choice(never if steady else [*never, *late, *late], int(odd.sum()))
+    if not steady:  # from as late as may be to as early as may be: as if a clock had been set
+        last = rng.integers(0, count - 1, 3)
+        age[last], age[last + 1] = most, -1.0
     if not steady and rng.random() < 0.3:  # a source that stops: the same reading, older and older
         span = _spell(rng, count, 0.2)
         age[span] = usual + np.cumsum(np.nan_to_num(dt[span], posinf=0.0, neginf=0.0))
     return age
 
 
-def draw_values(rng: Rng, plant: Plant, channels: Sequence[Input], time: FloatArray) -> FloatArray:
-    """Return the readings of a machine without faults."""
+def draw_values(rng: Rng, plant: Plant, channels: Sequence[Input], time: FloatArray, rest: int = 0) -> FloatArray:
+    """Return the readings of a machine without faults, of which at least `rest` are at rest."""
     count = len(time)
     speed = _levels(rng, count, [0.0, 0.0, 0.3 * TOP, 0.6 * TOP, TOP], quiet=rng.random() < 0.6)
-    heat = np.zeros(count)
+    speed[:rest], heat = 0.0, np.zeros(count)
     for k in range(1, count):
         share = abs(speed[k]) / TOP
         pace = 1.0 / plant.slow + share * (1.0 / plant.fast - 1.0 / plant.slow)
@@ -175,7 +183,13 @@ def _all_stuck(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
 
 
 def _jump(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
-    values[_spell(rng, len(values), float(rng.choice([0.01, 0.7]))), rng.choice(_heat(channels))] += rng.normal(0.0, 6.0)
+    span, k = _spell(rng, len(values), float(rng.choice([0.01, 0.7]))), rng.choice(_heat(channels))
+    values[span, k] += rng.normal(0.0, 6.0)
+
+
+def _spikes(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
+    hit = np.flatnonzero(rng.random(len(values)) < 0.03)
+    values[hit, rng.choice(_heat(channels), len(hit))] += rng.uniform(-8.0, 8.0, len(hit))
 
 
 def _drift(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
@@ -205,6 +219,10 @@ def _no_start(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
     values[rows, some] += rng.choice([-25.0, 16.0, 40.0, 200.0, -11.0])
 
 
+def _outlier_at_the_start(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
+    values[rng.integers(0, min(4, len(values))), rng.choice(_heat(channels))] += rng.choice([-4.0, 0.5, 3.0])
+
+
 def _hot_or_cold(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
     span, some = _spell(rng, len(values), 0.2), _heat(channels)
     values[span, some if rng.random() < 0.5 else some[:1]] += rng.choice([-30.0, -8.0, 8.0, 15.0, 60.0])
@@ -221,10 +239,14 @@ DAMAGES: tuple[Damage, ...] = (
     _all_stuck,
     _jump,
     _jump,
+    _spikes,
+    _spikes,
     _drift,
     _drift,
     _swap,
     _strange_speeds,
     _no_start,
+    _outlier_at_the_start,
+    _outlier_at_the_start,
     _hot_or_cold,
 )

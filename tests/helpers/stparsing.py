@@ -17,7 +17,7 @@ from thermocomp.export.st.structuredtext import SourceUnit
 PYTHON = {"LREAL": float, "DINT": int, "BOOL": bool}
 #: what may differ in statements that are parsed once: names and numbers
 _DIFFERS = re.compile(r"\b[A-Za-z]\w*\b|(?<![\w.])\d+(\.\d+(E[-+]?\d+)?)?")
-_WORDS = frozenset("IF THEN ELSIF ELSE END_IF FOR TO DO END_FOR WHILE END_WHILE AND OR NOT MOD TRUE FALSE".split())
+_WORDS = frozenset("IF THEN ELSIF ELSE END_IF FOR TO DO END_FOR WHILE END_WHILE AND OR NOT MOD TRUE FALSE".split())  # noqa: SIM905
 
 
 Type = Any  #: 'LREAL', 'DINT', 'BOOL', the name of a structure, or ('ARRAY', Type, size)
@@ -110,7 +110,8 @@ class Block(NamedTuple):
 def block_of(unit: SourceUnit) -> Block:
     """Parse a block: each kind of variable in each section, and its statements."""
     text = re.sub(r"\(\*.*?\*\)", "", unit.declaration, flags=re.DOTALL).strip()
-    whole = re.fullmatch(r"(FUNCTION|FUNCTION_BLOCK) (\w+)(?: : (\w+))?\s+((?:VAR\w*\n.*?END_VAR\s*)*)", text, re.DOTALL)
+    head, sections = r"(FUNCTION|FUNCTION_BLOCK) (\w+)(?: : (\w+))?", r"((?:VAR\w*\n.*?END_VAR\s*)*)"
+    whole = re.fullmatch(rf"{head}\s+{sections}", text, re.DOTALL)
     assert whole, text
     word, name, gives, sections = whole.groups(default="")
     found, head = [], f"{word} x{' : ' + gives if gives else ''}"
