@@ -48,7 +48,7 @@ def draw_watch(rng: Rng, plant: "Plant", inputs: Sequence[Input], speed: Input, 
             off=float(off[k]),
             jump=float(rng.uniform(1.5, 4.0)),
             moved=float(rng.uniform(0.5, 2.0)),
-            still=float(rng.choice([600.0, 3600.0, GAP])),
+            still=float(rng.choice([1800.0, 7200.0, GAP])),
             unseen=float(rng.choice([0.0, 0.1, 0.4])),
         )
         for k in range(n)
