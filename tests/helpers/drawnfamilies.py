@@ -45,7 +45,7 @@ def draw_joint(rng: Rng, inputs: Sequence[Input]) -> JointSupport | None:
         return None
     scale = tuple(0.3 * size_of(inputs[k]) for k in columns)
     ranges = np.array([[inputs[k].low, inputs[k].high] for k in columns]).reshape(-1, 2)
-    points = rng.uniform(*ranges.T, (int(rng.integers(1, 8)), len(columns))) / np.array(scale)
+    points = rng.uniform(ranges[:, 0], ranges[:, 1], (int(rng.integers(1, 8)), len(columns))) / np.array(scale)
     return JointSupport(
         columns=columns,
         scale=scale,

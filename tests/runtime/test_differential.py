@@ -184,10 +184,10 @@ def undriven_by_nobody(count: int) -> NDArray[np.bool_]:
     return np.zeros((count, 1), dtype=np.bool_)
 
 
-@pytest.mark.parametrize("seed", seeds(range(4), range(3000, 3040)))
+@pytest.mark.parametrize("seed", seeds(range(6), range(3000, 3040)))
 def test_a_fleet_is_as_many_compensators(seed: int) -> None:
     model, limits, plant = draw_fleet(seed)
-    rng, count, machines = np.random.default_rng((6, seed)), 90 if seed < 3000 else 1000, 3
+    rng, count, machines = np.random.default_rng((6, seed)), 200 if seed < 3000 else 1000, 3
     dt = rng.choice([5.0, 60.0, 60.0, 600.0, 0.01, 7e5], count, p=[0.2, 0.3, 0.3, 0.1, 0.09, 0.01])
     dt[rng.random(count) < 0.5] = dt[-1]  # the same again, often
     dt[0] = 0.0
