@@ -50,7 +50,7 @@ def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
     channels = gather(drawn.compensator).channels
     steady = seed % 3 == 0  # readings of one age: only then a clock that is set is as one that is not
     dt = draw_steps(rng, count, limits, exact=steady or rng.random() < 0.6)
-    rest = MANY if seed % 10 == 5 else 0  # more readings at rest than a zero is averaged of
+    rest = MANY if seed % 10 == 5 and count > MANY else 0  # more readings at rest than a zero is averaged of
     dt[:rest] = 0.125
     time = np.cumsum(np.where((dt >= 0.0) & (dt <= GAP), dt, 0.0))
     restarts = rng.random(count) < rng.choice([0.0, 0.5 / count, 3.0 / count])

@@ -114,7 +114,7 @@ def count_of(seed: int) -> int:
 @pytest.mark.parametrize("seed", ORDINARY)
 def test_the_program_is_numpy(seed: int) -> None:
     check(seed, MachineCode, count=count_of(seed))
-    for compiler in COMPILERS:
+    for compiler in COMPILERS if seed % 2 else COMPILERS[-1:]:
         check(seed, CCode, compiler, count=count_of(seed))
 
 
@@ -145,7 +145,7 @@ def only_later(stream: Stream) -> tuple[FloatArray, FloatArray]:
     return np.cumsum(stream.dt[later]), stream.values[later]
 
 
-@pytest.mark.parametrize("seed", seeds(range(20, 24), range(2000, 2040)))
+@pytest.mark.parametrize("seed", seeds(range(20, 28), range(2000, 2040)))
 def test_a_replay_is_numpy_with_probings_and_bands(seed: int) -> None:
     drawn, rng = draw_alone(seed), np.random.default_rng((5, seed))
     own, names = drawn.compensator, [c.name for c in gather(drawn.compensator).channels]
