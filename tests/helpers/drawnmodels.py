@@ -134,7 +134,7 @@ def _pick(rng: Rng, inputs: Sequence[Input]) -> tuple[Input, ...]:
     kept = [i for i in inputs if rng.random() < 0.7] if rng.random() < 0.5 else list(inputs)
     kept = kept or [inputs[0]]
     if rng.random() < 0.3:
-        rng.shuffle(kept)  # type: ignore[arg-type]
+        rng.shuffle(kept)
     if rng.random() < 0.2:
         k = int(rng.integers(len(kept)))
         kept[k] = replace(kept[k], low=0.6 * kept[k].low, high=1.1 * kept[k].high)

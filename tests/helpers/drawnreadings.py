@@ -41,7 +41,7 @@ class Stream(NamedTuple):
 
     def part(self, rows: slice | NDArray[np.intp]) -> "Stream":
         """Return some of the calls."""
-        return Stream(*(a[rows] for a in self))
+        return self._replace(**{name: a[rows] for name, a in self._asdict().items()})
 
 
 def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
@@ -69,7 +69,15 @@ def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
         sets = rng.choice([0.0, 1.0, -1.0], count, p=[0.99, 0.005, 0.005])
         clock = SET * np.cumsum(sets) + rng.choice([0.0, 2.0**31])
         resumed = (rng.random(count) < 3.0 / count) & (dt > 0.0) & (dt <= GAP)
-    return Stream(values, age, dt, clock, restarts, rng.random(count) < 4.0 / count, resumed & ~restarts)
+    return Stream(
+        values=values,
+        age=age,
+        dt=dt,
+        clock=clock,
+        restarts=restarts,
+        stored=rng.random(count) < 4.0 / count,
+        resumed=resumed & ~restarts,
+    )
 
 
 def draw_steps(rng: Rng, count: int, limits: Limits, *, exact: bool) -> FloatArray:

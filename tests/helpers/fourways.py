@@ -4,7 +4,7 @@ import ctypes
 import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import stmachine
@@ -84,8 +84,9 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
     return Said(np.array(decisions, dtype=np.int64), np.array(numbers))
 
 
-def _listed(array: NDArray[np.generic]) -> list[object]:
-    return array.tolist()
+def _listed(array: NDArray[np.generic]) -> list[Any]:
+    found: list[Any] = array.tolist()
+    return found
 
 
 def _stored(state: CompensatorState, compensator: Compensator) -> CompensatorState:

@@ -117,10 +117,12 @@ def block_of(unit: SourceUnit) -> Block:
     found, head = [], f"{word} x{' : ' + gives if gives else ''}"
     for section, body in re.findall(r"(VAR\w*)\n(.*?)END_VAR", sections, re.DOTALL):
         for line in filter(None, " ".join(body.split()).split(";")):
-            variable, what, start = re.fullmatch(r" ?(\w+) : (.*?)( := .*)?", line.rstrip()).groups(default="")
+            one = re.fullmatch(r" ?(\w+) : (.*?)( := .*)?", line.rstrip())
+            assert one, line
+            variable, what, start = one.groups(default="")
             few = re.sub(r"\[(\w+)(, \w+)*\]", r"[\1, \1]", start)
-            one = re.sub(r"0\.\.\d+", "0..1", what)
-            parsed(f"{head}\n{section}\n    x1 : {one}{few};\nEND_VAR\n{unit.end}\n")
+            small = re.sub(r"0\.\.\d+", "0..1", what)
+            parsed(f"{head}\n{section}\n    x1 : {small}{few};\nEND_VAR\n{unit.end}\n")
             found.append((section, variable, kind_of(what)))
     _check_names({variable for _, variable, _ in found} | {name})
     return Block(name, gives, found, pieces(unit.statements))
