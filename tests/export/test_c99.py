@@ -1,28 +1,25 @@
 """The C code of a compensator does what the compensator does: compiled by a real compiler, for every family."""
 
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, OPTIMISED, QUICK, SANITIZED, CompiledBlock, check_block, check_same
+from compiledblock import COMPILERS, OPTIMISED, SANITIZED, CompiledBlock, check_block, check_same
 from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from spoiling import FAILURES
 from watchedmachine import failing, watched_model
 
 from thermocomp.core.additive import Additive
 from thermocomp.core.correction import Limits
 from thermocomp.core.curves import Curve
 from thermocomp.core.inputs import Input, Support
-from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
-from thermocomp.core.zero import Zeroing
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
@@ -37,37 +34,6 @@ pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
 
 def accepted(model: ErrorModel, **changes: Any) -> ErrorModel:
     return replace(model, honest_error=ACCEPTED, **changes)
-
-
-#: gcc sees every family in `test_every_method`, too
-BOTH = ("polynomial", "autoregressive", "autoregressive-network")
-PAIRS = [
-    pytest.param(f, c, id=f"{f}-{c}", marks=pytest.mark.long if f not in BOTH and c != QUICK else ())
-    for c in COMPILERS
-    for f in FAMILIES
-]
-
-
-@pytest.mark.parametrize(("family", "compiler"), PAIRS)
-@settings(**SLOW)
-@given(
-    data=st.data(),
-    rows=READINGS,
-    zeroing=st.sampled_from([Zeroing(0.0, 0.0), Zeroing(60.0, 20.0, "n")]),
-    flags=st.sampled_from([SANITIZED, OPTIMISED]),
-)
-def test_the_code_is_the_compensator(
-    family: str,
-    compiler: str,
-    data: st.DataObject,
-    rows: list[tuple[float, ...]],
-    zeroing: Zeroing,
-    flags: tuple[str, ...],
-) -> None:
-    model: ErrorModel = accepted(data.draw(FAMILIES[family]), zeroing=zeroing)
-    table = np.array(rows)
-    times = np.concatenate([slower * table[:, 3] for slower in (1.0, 40.0)])  # long steps settle
-    check_block(Compensator.of([model], FREE), np.tile(table[:, :3], (2, 1)), times, compiler=compiler, flags=flags)
 
 
 def test_a_name_that_would_end_a_comment_does_not() -> None:
@@ -107,33 +73,6 @@ def test_in_single_precision_it_says_nearly_the_same(
     check_block(compensator, table[:, :3], table[:, 3], flags=(*SANITIZED, "-DTC_FLOAT"), within=1e-3)
 
 
-JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
-
-
-SPEED_ALONE = replace(JOINT, columns=(), scale=(), points=())
-
-
-@pytest.mark.parametrize(
-    ("policy", "joint"),
-    [
-        pytest.param("hold", None, id="hold-None", marks=pytest.mark.long),
-        pytest.param("hold", JOINT, id="hold-joint"),
-        pytest.param("hold", SPEED_ALONE, id="hold-speed"),
-        pytest.param("fade", None, id="fade-None"),
-        pytest.param("fade", JOINT, id="fade-joint"),
-        pytest.param("fade", SPEED_ALONE, id="fade-speed", marks=pytest.mark.long),
-    ],
-)
-@settings(**SLOW)
-@given(model=st.one_of(*FAMILIES.values()), over=st.sampled_from([0.1, 0.5, 2.0]), rows=READINGS)
-def test_beyond_the_trained_range(
-    policy: Literal["hold", "fade"], joint: JointSupport | None, model: ErrorModel, over: float, rows: list[Any]
-) -> None:
-    model = accepted(model, support=Support(policy, fade_over=over), joint=joint)
-    table = np.array(rows)
-    check_block(Compensator.of([model], FREE), table[:, :3], table[:, 3])
-
-
 @pytest.mark.parametrize("flags", [SANITIZED, (*SANITIZED, "-DTC_FLOAT")])
 def test_an_input_that_did_not_move_in_training_is_inside_where_it_was(flags: tuple[str, ...]) -> None:
     model = Polynomial(
@@ -148,25 +87,6 @@ def test_an_input_that_did_not_move_in_training_is_inside_where_it_was(flags: tu
     )
     said = check_block(Compensator.of([accepted(model)], FREE), np.array([[20.0], [20.5]]), np.ones(2), flags=flags)
     assert said.deviation.ravel().tolist() == [3.0, 0.0]
-
-
-@settings(**SLOW | {"max_examples": 30})
-@given(
-    models=st.lists(st.one_of(*FAMILIES.values()), min_size=2, max_size=3),
-    waiting=st.lists(st.booleans(), min_size=3, max_size=3),
-    rows=READINGS,
-    limits=st.builds(Limits, st.floats(1, 30), st.floats(0.01, 3), st.sampled_from([0.0, 0.5]), st.floats(10, 90)),
-)
-def test_several_targets_some_of_which_count_from_nothing(
-    models: list[ErrorModel], waiting: list[bool], rows: list[Any], limits: Limits
-) -> None:
-    absolute = (replace(INPUTS[0], rezero=False), *INPUTS[1:])
-    models = [
-        accepted(m, target=f"t{k}", inputs=INPUTS if w else absolute, zeroing=Zeroing(30.0, 10.0, "n"))
-        for k, (m, w) in enumerate(zip(models, waiting, strict=False))
-    ]
-    table = np.array(rows)
-    check_block(Compensator.of(models, limits), table[:, :3], table[:, 3])
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -231,16 +151,6 @@ def test_the_zero_of_many_readings(dt: float, rpm: float) -> None:
     if rpm == 0.0 and dt < 0.5:  # until the spindle starts, whatever the number of readings
         assert (said.status[:, 0] == 0).sum() == n // 2 - np.isnan(rows[: n // 2, 3]).sum()
     assert np.abs(said.correction).max() > 1.0
-
-
-@pytest.mark.parametrize("failure", FAILURES)
-def test_every_failure_that_the_watch_knows(failure: str) -> None:
-    compensator = Compensator.of([watched_model("z_um")])
-    day = failing()
-    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64, copy=True)
-    assert [c.name for c in gather(compensator).channels][3] == "spindle_rpm"
-    FAILURES[failure](rows)
-    check_block(compensator, rows, np.diff(day.time, prepend=day.time[0]))
 
 
 HOSTILE = st.one_of(

@@ -9,19 +9,15 @@ import numpy as np
 import pytest
 from blark.parse import parse
 from driftmodels import ACCEPTED
-from families import FAMILIES, READINGS
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from spoiling import FAILURES, models_of, spoiled
+from spoiling import models_of, spoiled
 from stmachine import Machine, check_block, check_same, run
 from stparsing import parsed
-from watchedmachine import failing, watched_model
+from watchedmachine import watched_model
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.inputs import Support
-from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.zero import Zeroing
 from thermocomp.export.facts import Facts
 from thermocomp.export.st.package import write_package
 from thermocomp.export.st.structuredtext import SourceUnit, translate
@@ -130,14 +126,6 @@ def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Sourc
     assert moved[-1] == fresh.memory.correction[0]
 
 
-@pytest.mark.parametrize("failure", FAILURES)
-def test_every_failure_that_the_watch_knows(failure: str) -> None:
-    compensator, day = Compensator.of([watched_model("z_um")]), failing()
-    rows = day.table[[c.name for c in gather(compensator).channels]].to_numpy(dtype=np.float64, copy=True)
-    FAILURES[failure](rows)
-    check_block(compensator, Readings(rows, np.zeros(len(rows)), np.diff(day.time, prepend=day.time[0])))
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("method", ["averaged", "mra"])
 def test_a_whole_recording_with_sensors_that_fail(shared_data: Path, method: str) -> None:
@@ -149,29 +137,6 @@ def test_a_whole_recording_with_sensors_that_fail(shared_data: Path, method: str
     for seed in range(3):
         dt = np.diff(recording.time, prepend=recording.time[0])
         check_block(compensator, Readings(spoiled(rows, seed) if seed else rows, np.zeros(len(rows)), dt))
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-@settings(**SLOW, max_examples=2)
-@given(data=st.data(), rows=READINGS, zeroing=st.sampled_from([Zeroing(0.0, 0.0), Zeroing(60.0, 20.0, "n")]))
-def test_of_every_family(family: str, data: st.DataObject, rows: list[tuple[float, ...]], zeroing: Zeroing) -> None:
-    model: ErrorModel = accepted(data.draw(FAMILIES[family]), zeroing=zeroing)
-    table = np.array(rows)
-    for slower in (1.0, 40.0):
-        readings = Readings(table[:, :3], np.zeros(len(rows)), slower * table[:, 3])
-        check_block(Compensator.of([model], FREE), readings)
-
-
-JOINT = JointSupport((0, 1), (4.0, 3.0), ((0.0, 0.0), (1.0, -1.0), (2.5, 1.0)), 1.5, (2,), ((0.0, 2500.0),), (250.0,))
-
-
-@pytest.mark.parametrize("policy", ["hold", "fade"])
-@settings(**SLOW, max_examples=3)
-@given(model=FAMILIES["polynomial"], joint=st.sampled_from([None, JOINT]), rows=READINGS)
-def test_beyond_the_trained_range(policy: Any, joint: JointSupport | None, model: ErrorModel, rows: list[Any]) -> None:
-    model = accepted(model, support=Support(policy, fade_over=0.5), joint=joint)
-    table = np.array(rows)
-    check_block(Compensator.of([model], FREE), Readings(table[:, :3], np.zeros(len(rows)), table[:, 3]))
 
 
 ODD = st.one_of(st.floats(), st.sampled_from([np.nan, np.inf, -np.inf, 1e308, -0.0, 85.0, -127.0, 65535.0]))

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, OPTIMISED, SANITIZED, CompiledBlock
+from compiledblock import COMPILERS, CompiledBlock
 from spoiling import models_of, spoiled
-from watchedmachine import LOST, failing, watched_model
 
 from thermocomp.core.correction import Limits
 from thermocomp.export.c99.package import write_package
@@ -90,35 +89,3 @@ def test_fl_thermal_with_faults(shared_data: Path, tmp_path: Path, method: str, 
 
 def test_the_virtual_machine_with_faults(tmp_path: Path) -> None:
     check_recording(virtual.record("demo")[0], ["z_um", "y1_um"], "averaged", tmp_path, every=3)
-
-
-@pytest.mark.long
-def test_a_million_readings_of_sensors_that_fail(tmp_path: Path) -> None:
-    """1,250 days of 800 readings; no decision differs, and nothing moves beyond its limits."""
-    limits = Limits(magnitude=15.0, rate=0.05, dead_band=0.1, hold=600.0, fade=600.0)
-    model = watched_model("z_um")
-    assert model.honest_error is not None
-    assert set(model.honest_error.lost) == set(LOST)
-    compensator = Compensator.of([model], limits)
-    block, rng = CompiledBlock(compensator, tmp_path, flags=(*SANITIZED, *OPTIMISED)), np.random.default_rng(7)
-    day, calls, most, statuses, faults = failing(), 0, 0.0, set[int](), set[int]()
-    whole = readings_of(day, block)
-    for seed in range(1250):
-        dt = whole.dt * rng.choice([0.1, 0.5, 1.0])
-        odd = rng.random(len(dt)) < 0.01
-        dt[odd] = rng.choice([np.nan, -1.0, 0.0, 1e3, 1e12, np.inf], odd.sum())
-        age = np.where(rng.random(len(dt)) < 0.01, rng.choice([100.0, -3.0, np.nan, 30.0, 59.9], len(dt)), 0.2)
-        readings = Readings(spoiled(whole.values, seed), age, dt)
-        said, code = replay(compensator, block.tables, readings), block.run(readings)
-        decisions, apart = count_apart(said, code)
-        assert decisions == 0, seed
-        most, calls = max(most, apart), calls + len(dt)
-        moved = np.abs(np.diff(code.correction[:, 0], prepend=0.0))
-        assert (np.abs(code.correction) <= 15.0).all()
-        assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()
-        statuses |= set(code.status.ravel().tolist())
-        faults |= set(code.fault.ravel().tolist())
-    assert calls == 1_000_000
-    assert most < 1e-12
-    assert statuses == {0, 1, 2, 3}
-    assert faults == {0, 1, 2, 3, 4, 5}

@@ -67,9 +67,7 @@ def compiled(files: tuple[tuple[str, str], ...], name: str, compiler: str, flags
             (folder / file).write_text(text, encoding="utf-8")
         command = [compiler, *FLAGS, *flags, "-fPIC", "-shared", "driver.c", "-o", "block.so", "-lm"]
         subprocess.run(command, check=True, cwd=folder)
-        library = ctypes.CDLL(str(folder / "block.so"))
-    library.begin.restype = ctypes.c_void_p
-    return library
+        return ctypes.CDLL(str(folder / "block.so"))
 
 
 class CompiledBlock:
@@ -103,6 +101,7 @@ class CompiledBlock:
             flags = ["-fsanitize-trap=undefined" if f == "-fno-sanitize-recover" else f for f in flags]
         files = tuple((f.name, f.read_text(encoding="utf-8")) for f in sorted(folder.glob(f"{sources.name}.[ch]")))
         self._library = compiled((*files, ("driver.c", text)), sources.name, compiler, tuple(flags))
+        self._library.begin.restype = ctypes.c_void_p
 
     def run(self, readings: Readings) -> Answers:
         """Run it from the start."""

@@ -5,14 +5,13 @@ number of 32 bits that overflows and a variable that is read before it is set ar
 """
 
 import math
-import re
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from blark import transform as b
-from stparsing import PYTHON, Array, Block, Type, block_of, declared
+from stparsing import PYTHON, Array, Block, Piece, Type, block_of, declared
 
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
 from thermocomp.export.vectors import Answers, Readings, replay
@@ -35,7 +34,7 @@ class Machine:
     def __init__(self, units: Sequence[SourceUnit]) -> None:
         self._structs = {u.name: declared(u.declaration) for u in units if not u.end}
         blocks = [block_of(u) for u in units if u.end]
-        self._heads = {str(block.head.name): _head(block) for block in blocks}
+        self._heads = {block.name: _head(block) for block in blocks}
         self._space: dict[str, Any] = {
             "Array": Array,
             "SEL": lambda g, one, other: other if g else one,
@@ -44,7 +43,7 @@ class Machine:
         }
         for block in blocks:
             exec(_Function(self, block).source(), self._space)
-        self._name = str(blocks[-1].head.name)
+        self._name = blocks[-1].name
         self.start()
 
     def start(self) -> None:
@@ -90,44 +89,25 @@ def _trunc(value: float) -> int:
     return int(value)
 
 
+_SECTIONS = {"VAR_INPUT": "in", "VAR_IN_OUT": "inout", "VAR_OUTPUT": "out", "VAR": "own"}
+
+
 def _head(block: Block) -> dict[str, Any]:
-    """Return names and types of a block's variables, by section."""
-    found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}}
-    words = {
-        b.InputDeclarations: "in",
-        b.InputOutputDeclarations: "inout",
-        b.OutputDeclarations: "out",
-        b.VariableDeclarations: "own",
-        b.FunctionVariableDeclarations: "own",
-    }
-    for section in block.head.declarations:
-        for item in section.items:
-            kind = _type(str(item.init).split(":=")[0])
-            for variable in item.variables:
-                found[words[type(section)]][str(variable.variable if hasattr(variable, "variable") else variable)] = (
-                    kind
-                )
-    if block.numbered:
-        del found["own"]["v1"]
-        found["own"] |= dict.fromkeys(block.numbered, "LREAL")
-    returned = getattr(block.head, "return_type", None)
-    found["gives"] = str(returned) if returned is not None else None
+    """Return names and types of a block's variables, by section, and what a function gives."""
+    found: dict[str, Any] = {"in": {}, "inout": {}, "out": {}, "own": {}, "gives": block.gives or None}
+    for section, name, kind in block.variables:
+        found[_SECTIONS[section]][name] = kind
     return found
-
-
-def _type(text: str) -> Type:
-    sized = re.fullmatch(r"ARRAY ?\[0\.\.(\d+)\] OF (\w+)", text.strip())
-    return ("ARRAY", sized.group(2), int(sized.group(1)) + 1) if sized else text.strip()
 
 
 class _Function:
     """Writes a block as Python."""
 
     def __init__(self, machine: Machine, block: Block) -> None:
-        self._machine, self._body, self._name = machine, block.body, str(block.head.name)
+        self._machine, self._body, self._name = machine, block.body, block.name
         self._written: dict[str, str] = {}
         head = machine.head(self._name)
-        self._is_block = isinstance(block.head, b.FunctionBlock)
+        self._is_block = not block.gives
         self._types: dict[str, Type] = {**head["in"], **head["inout"], **head["out"], **head["own"]}
         self._given = [*head["inout"], *head["in"]]
         if not self._is_block:
@@ -136,29 +116,35 @@ class _Function:
     def source(self) -> str:
         given = "self" if self._is_block else ", ".join(self._given)
         lines = [f"def {self._name}({given}):"]
-        for piece in self._body:
-            self._written = piece.written
-            lines += self._block_of(piece.tree, 1)
+        lines += self._block_of(self._body, 1)
         if not self._is_block:
             lines += [f"    return {self._name}_"] if self._types[self._name] == "LREAL" else ["    return False"]
         return "\n".join(lines)
 
-    def _block_of(self, body: Any, depth: int) -> list[str]:
-        statements = body.statements if body else []
-        return [line for s in statements for line in self._statement(s, depth)] or ["    " * depth + "pass"]
+    def _block_of(self, body: Sequence[Piece], depth: int) -> list[str]:
+        lines, outer = list[str](), self._written
+        for piece in body:
+            self._written = piece.written
+            lines += self._statement(piece.tree, piece.bodies, depth)
+        self._written = outer
+        return lines or ["    " * depth + "pass"]
+
+    def _named(self, name: Any) -> str:
+        """Return the name that stands where another was parsed."""
+        return self._written.get(str(name), str(name))
 
     def _instance(self, s: Any, pad: str) -> list[str]:
         """Return a call of an instance of a function block."""
         name, kind = self._value(s.name)
         head = self._machine.head(kind)
-        assert [str(p.name) for p in s.parameters] == list(head["in"]), s
+        assert [self._named(p.name) for p in s.parameters] == list(head["in"]), s
         lines = []
         for p, (parameter, wanted) in zip(s.parameters, head["in"].items(), strict=True):
             value = self._as(p.value, wanted)
             lines.append(f"{pad}{name}.{parameter} = {f'Array({value})' if isinstance(wanted, tuple) else value}")
         return [*lines, f"{pad}{kind}({name})"]
 
-    def _statement(self, s: Any, depth: int) -> list[str]:
+    def _statement(self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int) -> list[str]:
         pad = "    " * depth
         match s:
             case b.AssignmentStatement():
@@ -167,21 +153,19 @@ class _Function:
                 assert kind == given, f"{s}: {given} for {kind}"
                 return [f"{pad}{target} = {value}"]
             case b.IfStatement():
-                lines = [f"{pad}if {self._as(s.if_expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
-                for other in s.else_ifs:
-                    lines += [f"{pad}elif {self._as(other.if_expression, 'BOOL')}:"]
-                    lines += self._block_of(other.statements, depth + 1)
-                if s.else_clause:
-                    lines += [f"{pad}else:", *self._block_of(s.else_clause.statements, depth + 1)]
-                return lines
+                tests = [s.if_expression, *(other.if_expression for other in s.else_ifs)]
+                heads = [f"{pad}{'el' * (k > 0)}if {self._as(t, 'BOOL')}:" for k, t in enumerate(tests)]
+                heads += [f"{pad}else:"] if s.else_clause else []
+                inner = [self._block_of(body, depth + 1) for body in bodies]
+                return [line for head, lines in zip(heads, inner, strict=True) for line in (head, *lines)]
             case b.ForStatement():
                 begin, end = self._as(s.from_, "DINT"), self._as(s.to, "DINT")
                 target = self._value(s.control)[0]
-                return [f"{pad}for {target} in range({begin}, {end} + 1):", *self._block_of(s.statements, depth + 1)]
+                return [f"{pad}for {target} in range({begin}, {end} + 1):", *self._block_of(bodies[0], depth + 1)]
             case b.WhileStatement():
-                return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(s.statements, depth + 1)]
+                return [f"{pad}while {self._as(s.expression, 'BOOL')}:", *self._block_of(bodies[0], depth + 1)]
             case b.FunctionCallStatement() | b.FunctionCall():
-                if str(s.name.name) in self._types:
+                if self._named(s.name.name) in self._types:
                     return self._instance(s, pad)
                 return [f"{pad}{self._value(s)[0]}"]
         raise TypeError(f"{type(s)}: {s}")
@@ -206,7 +190,7 @@ class _Function:
             case b.Real():
                 return repr(float(self._number(node.value))), "LREAL"
             case b.SimpleVariable():
-                name = self._written.get(str(node.name), str(node.name))
+                name = self._named(node.name)
                 if name == self._name:
                     return f"{name}_", self._types[name]
                 return (f"self.{name}" if self._is_block else name), self._types[name]
@@ -214,7 +198,7 @@ class _Function:
                 text, kind = self._value(node.name)
                 for element in node.elements:
                     if isinstance(element, b.FieldSelector):
-                        member = str(element.field.name)
+                        member = self._named(element.field.name)
                         text, kind = f"{text}.{member}", self._machine.kind_of(kind, member)
                     else:
                         assert kind[0] == "ARRAY", node
@@ -248,7 +232,7 @@ class _Function:
         return f"({one} {op} {other})", kind
 
     def _call(self, node: Any) -> tuple[str, Type]:
-        name, given = str(node.name.name), node.parameters
+        name, given = self._named(node.name.name), node.parameters
         values = [p.value for p in given]
         if name in _NUMBERS:
             return f"{name}({self._as(values[0], 'LREAL')})", "LREAL"
@@ -266,7 +250,7 @@ class _Function:
             return f"SEL({self._as(values[0], 'BOOL')}, {one}, {other})", kind
         head = self._machine.head(name)
         wanted = {**head["inout"], **head["in"]}
-        assert [str(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
+        assert [self._named(p.name) for p in given] == list(wanted), f"{node}: wants {list(wanted)}"
         texts = [self._as(v, kind) for v, kind in zip(values, wanted.values(), strict=True)]
         return f"{name}({', '.join(texts)})", head["gives"]
 

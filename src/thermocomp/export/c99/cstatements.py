@@ -45,6 +45,7 @@ class _Writer(Printer):
         text = "\n".join(lines)
         declared = [f"    {TYPES[kind]} {name};" for name, kind in used_locals(f).items()]
         passed = [] if f.is_of_numbers or "(s, w" in text else [v for v in "sw" if f"{v}->" not in text]
+        passed += [p for p in f.parameters if not re.search(rf"\b{p}\b", text)]
         unused = [f"    (void){v};" for v in passed]
         return f"{head}\n{{\n" + "\n".join([*declared, *([""] if declared else []), *unused, *lines]) + "\n}\n"
 

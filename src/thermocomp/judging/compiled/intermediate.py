@@ -1,7 +1,7 @@
 """The program in LLVM's intermediate representation, for any compensator: its variables are in flat arrays."""
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import assert_never
 
 from thermocomp.runtime.program import tree as n
@@ -26,29 +26,39 @@ _INTRINSIC = {"abs": "llvm.fabs.f64", "floor": "llvm.floor.f64", "sqrt": "llvm.s
 _POINTERS = ", ".join(f"ptr noalias {'' if a[0] in 'swr' else 'readonly '}%{a}" for a in ARRAYS)
 
 
-def write_module(functions: Sequence[Callable[..., None]]) -> str:
-    """Return procedures of the program, and all that they call, as the text of a module.
-
-    Each procedure takes pointers to the arrays of `FlatMemory`, in the order of `ARRAYS`.
-    """
-    found: dict[str, str] = {}
+def write_module(procedures: Sequence[Callable[..., None]]) -> str:
+    """Return procedures of the program, and all that they call, as the text of a module."""
+    found: dict[str, Function] = {}
 
     def add(name: str) -> None:
         function = find_function(name)
         for node in n.walk(function.body):
             if isinstance(node, n.Call | n.ProcedureCall) and node.name not in found and is_known(node.name):
                 add(node.name)
-        found[name] = _Writer(function).text(is_public=name in names)
+        found[name] = function
 
-    names = [f.__name__ for f in functions]
+    names = [p.__name__ for p in procedures]
     for name in names:
         if name not in found:
             add(name)
+    return write_functions(found.values(), names)
+
+
+def write_functions(functions: Iterable[Function], public: Collection[str]) -> str:
+    """Return functions of the program as the text of a module.
+
+    Each procedure takes pointers to the arrays of `FlatMemory`, in the order of `ARRAYS`.
+
+    Parameters
+    ----------
+    public : collection of str
+        Names of the procedures that are called from Python.
+    """
     declared = [
         f"declare double @{_INTRINSIC.get(name, name)}({', '.join(['double'] * count)})"
         for name, count in _LIBRARY.items()
     ]
-    return "\n".join([*declared, *found.values()])
+    return "\n".join([*declared, *(_Writer(f).text(is_public=f.name in public) for f in functions)])
 
 
 class _Writer:
@@ -65,8 +75,8 @@ class _Writer:
         f = self._function
         given = [] if f.is_of_numbers else [_POINTERS]
         given += [f"{_TYPES[kind]} %{name}.in" for name, kind in f.parameters.items()]
-        own = [f"  %{name} = alloca {_TYPES[kind]}" for name, kind in {**f.parameters, **f.locals}.items()]
-        own += [f"  store {_TYPES[kind]} %{name}.in, ptr %{name}" for name, kind in f.parameters.items()]
+        own = [f"  %{name}.own = alloca {_TYPES[kind]}" for name, kind in {**f.parameters, **f.locals}.items()]
+        own += [f"  store {_TYPES[kind]} %{name}.in, ptr %{name}.own" for name, kind in f.parameters.items()]
         self._block(f.body)
         if not f.is_of_numbers:
             self._lines.append("  ret void")
@@ -151,7 +161,7 @@ class _Writer:
 
     def _store(self, target: n.Name | n.Element, value: str) -> None:
         if isinstance(target, n.Name) and not target.record:
-            self._lines.append(f"  store {_TYPES[target.kind]} {value}, ptr %{target.name}")
+            self._lines.append(f"  store {_TYPES[target.kind]} {value}, ptr %{target.name}.own")
             return
         if target.kind == "bool":
             value = self._new(f"zext i1 {value} to i64")
@@ -187,7 +197,7 @@ class _Writer:
                 size = self._size(name)
                 return self._once(f"icmp ne i64 {size}, 0") if kind == "bool" else size
             case n.Name(kind, name, ""):
-                return self._new(f"load {_TYPES[kind]}, ptr %{name}")
+                return self._new(f"load {_TYPES[kind]}, ptr %{name}.own")
             case n.Name(kind) | n.Element(kind):
                 found = self._new(f"load {'i64' if kind == 'bool' else _TYPES[kind]}, ptr {self._pointer(node)}")
                 return self._new(f"icmp ne i64 {found}, 0") if kind == "bool" else found

@@ -11,18 +11,23 @@ from thermocomp.judging.compiled.intermediate import write_module
 from thermocomp.runtime.program.memory import ARRAYS, FlatMemory
 
 
-@cache
-def _engine() -> llvm.ExecutionEngine:
-    """Return the machine code of all procedures that are called from Python; a fraction of a second, once."""
+def compile_module(text: str, effort: int = 2) -> llvm.ExecutionEngine:
+    """Return the machine code of a module, see `thermocomp.judging.compiled.intermediate`."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_default_triple().create_target_machine(opt=2)
-    module = llvm.parse_assembly(write_module(rows.PROCEDURES))
+    machine = llvm.Target.from_default_triple().create_target_machine(opt=effort)
+    module = llvm.parse_assembly(text)
     module.verify()
-    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    options = llvm.create_pipeline_tuning_options(speed_level=effort)
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     return llvm.create_mcjit_compiler(module, machine)
+
+
+@cache
+def _engine() -> llvm.ExecutionEngine:
+    """Return the machine code of all procedures that are called from Python; a fraction of a second, once."""
+    return compile_module(write_module(rows.PROCEDURES))
 
 
 @cache

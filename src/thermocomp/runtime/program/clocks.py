@@ -27,7 +27,7 @@ def run_clock(s: Kept, w: Work, t: Constants, c: Whole, begun: Condition) -> Non
         dt.set(phase)
     moves = let("moves", flag(True))
     with repeat_while((ticks > 0.0) & moves):  # a settled value does not change any more
-        moves.set(False)
+        moves.set(s.phase[c].differs(0.0))  # the first mean is partly of earlier readings: another one follows
         for i in each("i", first, first + leaves):
             w.average[i] = (s.total[i] + (t.interval[c] - s.phase[c]) * w.leaf[i]) / t.interval[c]
             s.total[i] = 0.0

@@ -81,7 +81,8 @@ class FlatMemory:
         }
         self.arrays |= {"at": np.array(at), "sizes": np.array([sizes.get(name, 0) for name in SIZES])}
         for name, value in values.items():
-            self.find("t", name)[...] = value
+            found = self.find("t", name)
+            found[...] = np.reshape(value, found.shape)  # also of a table without rows
 
     def find(self, record: str, name: str) -> NDArray[Any]:
         """Return a view of a variable, without dimensions for a single number."""

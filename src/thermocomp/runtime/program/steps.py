@@ -131,6 +131,8 @@ def take(s: Kept, w: Work, t: Constants) -> None:
     w.step = 0.0
     with when(s.seen):
         w.step = w.now - s.time
+        with when(w.step > GAP):
+            w.step = GAP
     for c in each("c", t.CHANNELS):
         w.input[c] = w.value[c]
     with when(t.has_absolute):
@@ -143,7 +145,7 @@ def take(s: Kept, w: Work, t: Constants) -> None:
     s.outside = 0
     for r in each("r", t.RANGES):
         change = let("change", w.input[t.channel[r]] - s.zero[r])
-        with when((s.known | ~t.rezero[r]) & ((change < t.bound_low[r]) | (change > t.bound_high[r]))):
+        with when((s.known | ~t.waits[r]) & ((change < t.bound_low[r]) | (change > t.bound_high[r]))):
             s.outside = s.outside + 1
     s.seen = True
     s.time = w.now

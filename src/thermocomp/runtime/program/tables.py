@@ -139,10 +139,12 @@ def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: di
     heat = [r.quantity == "temperature" for r in ranges]
     span = [max(r.high - r.low, MIN_SPAN) for r in ranges]
     wide = [WIDE * max(r.high - r.low, abs(r.low), abs(r.high), 1.0) for r in ranges]
-    bounds: dict[Input, tuple[float, float]] = {}
-    for m in reversed(models):
+    bounds: dict[Input, list[tuple[float, float]]] = {r: [] for r in ranges}
+    for m in models:
         low, high, _ = m.bounds
-        bounds |= {i: (a, b) for i, a, b in zip(m.inputs, low, high, strict=True)}
+        for i, a, b in zip(m.inputs, low, high, strict=True):
+            bounds[i].append((a, b))
+    at_once = {i for m in models if not any(i.rezero for i in m.inputs) for i in m.inputs}
     return {
         "channel": [place[r.name] for r in ranges],
         "temperature": heat,
@@ -155,8 +157,9 @@ def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: di
         "least": [low for low, _ in limits],
         "most": [high for _, high in limits],
         "span": span,
-        "bound_low": [bounds[r][0] for r in ranges],
-        "bound_high": [bounds[r][1] for r in ranges],
+        "bound_low": [max(low for low, _ in bounds[r]) for r in ranges],
+        "bound_high": [min(high for _, high in bounds[r]) for r in ranges],
+        "waits": [r not in at_once for r in ranges],
     }
 
 
