@@ -1,13 +1,14 @@
 """Times whose stated unit makes a test too slow or too fast: told, never replaced by a guess, settled by a mapping."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 
 from thermocomp.cli.app import run
-from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import TwoReadingsError
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.checks.quality import check
@@ -36,13 +37,13 @@ SLOW = {
 CASES = {**FAST, **SLOW}
 
 
-def written(folder: Path, unit: str, times: FloatArray, below: bool, steep: float = 3.5) -> Path:
+def written(folder: Path, unit: str, times: NDArray[Any], below: bool, steep: float = 3.5) -> Path:
     """Write a warm-up by 3 degC, whose half takes a fifth of the test; less if it is steeper."""
     warm = 3 * (1 - np.exp(-np.linspace(0, steep, len(times))))
     noise = np.random.default_rng(4).normal(size=(2, len(times)))
     head = f"Time,T1,Z\n{unit},degC,um\n" if below else f"time_{unit},T1 [degC],Z [um]\n"
     rows = (
-        f"{t:.10g},{20 + w + 0.01 * a:.3f},{5 * w + 0.2 * b:.2f}\n"
+        f"{t:.12g},{20 + w + 0.01 * a:.3f},{5 * w + 0.2 * b:.2f}\n"
         for t, w, a, b in zip(times, warm, *noise, strict=True)
     )
     path = folder / "logger.csv"
@@ -96,7 +97,7 @@ def test_a_mapping_settles_it(case: str, tmp_path: Path) -> None:
     unit, times, likely, hours, true_hours = CASES[case]
     path, mapping = written(tmp_path, unit, times, below=True), tmp_path / "begun.toml"
     for said, lasts in ((likely, true_hours), (unit, hours)):
-        recording = read(path, Mapping(TimeColumn(unit=said)))  # type: ignore[arg-type]
+        recording = read(path, Mapping(TimeColumn(unit=said)))
         assert recording.time[-1] / 3600 == pytest.approx(lasts, rel=1e-4)
         assert [f.severity for f in of_unit(recording)] == ["warning"] * (said == unit)
         mapping.write_text(f'[time]\nunit = "{said}"\n', encoding="utf-8")
@@ -127,7 +128,7 @@ def test_a_unit_without_another_is_confirmed(tmp_path: Path) -> None:
     assert found.remedy == {"time": {"unit": "s"}}
     asked: list[Question] = []
     with pytest.raises(TwoReadingsError):
-        mend(path, "", asked.append)  # type: ignore[func-returns-value]
+        mend(path, "", asked.append)
     assert [q.options for q in asked if q.options[0] == found.remedy] == [(found.remedy,)]
 
 

@@ -182,7 +182,7 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
     steps = np.diff(whole)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
-    notes = (f"{file.heading!r} is read as {form}, as the heading specifies",) if short else ()
+    notes: tuple[str, ...] = (f"{file.heading!r} is read as {form}, as the heading specifies",) if short else ()
     if not midnights.any() or whole.max() >= _DAY:
         return (whole - whole[0]) / 1e9, "", notes
     places = tell_places((np.flatnonzero(midnights) + 1).tolist(), file.table.place)
