@@ -132,6 +132,16 @@ def test_a_unit_without_another_is_confirmed(tmp_path: Path) -> None:
     assert [q.options for q in asked if q.options[0] == found.remedy] == [(found.remedy,)]
 
 
+def test_a_table_in_memory_states_its_unit_too() -> None:
+    for unit, times in (("min", np.arange(200) * 60.0), ("h", np.arange(200) * 2.0)):
+        table = pd.DataFrame({f"time_{unit}": times, "t1_C": 20 + np.linspace(0, 3, 200)})
+        (found,) = of_unit(Recording.from_dataframe(table))
+        assert f"if {unit} is right" in found.text
+    passed = pd.DataFrame({"t1_C": 20 + np.linspace(0, 3, 200)}, index=pd.to_timedelta(np.arange(200) * 2, unit="h"))
+    (found,) = of_unit(Recording.from_dataframe(passed))
+    assert found.remedy is None
+
+
 # -- near misses ---------------------------------------------------------------------------------------------------
 
 

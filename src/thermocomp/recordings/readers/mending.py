@@ -73,7 +73,8 @@ Decide = Callable[[Question], Remedy | None]
 def take_best(question: Question) -> Remedy | None:
     """Return the most likely option; None for warnings and infos, and where only the user can decide.
 
-    The user decides on steps that shift, offset or exchange values, and on times with several likely interpretations.
+    The user decides on steps that shift, offset or exchange values, on times with several likely interpretations, and
+    on units of time that are stated but implausible.
     """
     if not question.may_guess:
         return None

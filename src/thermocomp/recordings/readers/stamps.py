@@ -99,9 +99,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
             notes = (f"the dates are {_WORDS[stated[0]]}, as the heading specifies",)
             _refuse_impossible(plain, shape, orders, stated[0], found)
         _refuse_other_order(plain, shape, stated[0], found, by_heading=len(orders) > 1)
-        orders = stated
-    elif stated:  # the row of units contradicts the heading
-        orders = stated
+    orders = stated or orders  # two are stated if the row of units contradicts the heading
     as_usual = _has_points(shape) and "dmy" in orders and not stated
     read = {"dmy": parse(plain, _format(shape, "dmy"))} if as_usual else {}
     if not any(_is_one_stretch(stamps) for stamps in read.values()):
