@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError, TwoReadingsError
-from thermocomp.recordings.readers.mapping import Mapping, TimeColumn
+from thermocomp.recordings.readers.mapping import Mapping, TimeColumn, check_content
 from thermocomp.recordings.readers.mending import read_or_offer
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
@@ -151,15 +151,15 @@ def test_minutes_and_seconds_are_not_taken_for_hours_and_minutes(
     assert "hours and minutes or as minutes and seconds" in " ".join(capsys.readouterr().err.split())
 
 
-def test_what_changes_no_duration_is_taken_without_a_question(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_single_day_is_asked_for_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The duration is the same either way, but not that of the next test of this logger, read by the same mapping."""
     day = series(datetime(2024, 3, 5, 8), timedelta(minutes=10), 48)
-    path = written(tmp_path / "day.csv", day, "%d/%m/%Y %H:%M")
-    with pytest.raises(InputError, match="day/month/year or month/day/year, and no row shows which; state how"):
+    path, output = written(tmp_path / "day.csv", day, "%d/%m/%Y %H:%M"), tmp_path / "day.toml"
+    with pytest.raises(TwoReadingsError, match=r"day/month/year or month/day/year, and no row shows which \(.*7\.83 h"):
         read(path)
-    assert run(["map", str(path), "--yes"]) == 0
-    assert "%d/%m/%Y" in capsys.readouterr().out
+    assert run(["map", str(path), "--yes", "-o", str(output)]) == 2
+    assert '"%m/%d/%Y %H:%M"' in " ".join(capsys.readouterr().err.split())
+    assert not output.exists()
 
 
 def test_a_question_without_a_likely_answer_has_none_beforehand(
@@ -209,6 +209,111 @@ def test_a_row_of_units_may_state_the_order(tmp_path: Path) -> None:
     path.write_text("Date,Time,T1,Z\nmm/dd/yyyy,hh:mm:ss,degC,um\n" + rows, encoding="utf-8")
     recording = read(path)
     assert (recording.time[-1], recording.start) == (26 * 3600, "2024-03-05T07:00:00")
+
+
+#: three days with pauses, of which no row shows the order
+PAUSED = [t for d in (5, 6, 7) for t in series(datetime(2024, 3, d, 8), timedelta(minutes=5), 40)]
+
+
+@pytest.mark.parametrize(
+    ("said", "form"),
+    [
+        ("yyyy-dd-mm", "%Y-%d-%m %H:%M"),
+        ("YYYY-DD-MM HH:MM", "%Y-%d-%m %H:%M"),
+        ("yyyy-dd-mmThh:mm:ss", "%Y-%d-%mT%H:%M:%S"),
+        ("JJJJ/TT/MM", "%Y/%d/%m %H:%M"),
+        ("yy-dd-mm", "%y-%d-%m %H:%M"),
+        ("yyyy/dd/mm", "%Y/%d/%m,%H:%M"),
+        ("yyyy-dd-mm", "%Y-%d-%m,%H:%M:%S"),
+        ("mm/dd/yyyy", "%m/%d/%Y %H:%M"),
+        ("mm.dd.yyyy", "%m.%d.%Y,%H:%M"),
+    ],
+)
+@pytest.mark.parametrize("below", [True, False])
+def test_an_order_that_is_stated_applies(said: str, form: str, below: bool, tmp_path: Path) -> None:
+    path = written(tmp_path / "stated.csv", PAUSED, form)
+    headings, rows = path.read_text("utf-8").split("\n", 1)
+    first, *others = headings.split(",")
+    if below:
+        clock = ["hh:mm"] if "," in form else []
+        headings = "\n".join(
+            (",".join((first, *others[: len(clock)], "T1", "Z")), ",".join((said, *clock, "degC", "um")))
+        )
+    else:
+        headings = ",".join((f"{first} ({said})", *others))
+    path.write_text(f"{headings}\n{rows}", "utf-8")
+    recording = read(path)
+    as_it_was(recording, PAUSED)
+    assert any("as the heading specifies" in note for note in recording.notes)
+
+
+def test_year_day_month_that_breaks_the_recording_is_asked_for(tmp_path: Path) -> None:
+    night = series(datetime(2024, 3, 5, 20), timedelta(minutes=5), 100)
+    path = written(tmp_path / "night.csv", night, "%Y-%m-%d %H:%M")
+    path.write_text(path.read_text("utf-8").replace("Timestamp", "Time (yyyy-dd-mm)"), "utf-8")
+    with pytest.raises(TwoReadingsError, match=r"year/day/month.* or year/month/day.*8\.25 h"):
+        read(path)
+    assert run(["map", str(path), "--yes"]) == 2
+
+
+def test_a_stated_order_in_which_time_falls_is_asked_for(tmp_path: Path) -> None:
+    """The tests are of 7 March and 5 April; by the heading, of 3 July and 4 May."""
+    days = [t for m in (3, 4) for t in series(datetime(2024, m, 13 - 2 * m, 8), timedelta(minutes=5), 5)]
+    path = written(tmp_path / "falls.csv", days, "%m/%d/%Y %H:%M")
+    path.write_text(path.read_text("utf-8").replace("Timestamp", "Time (dd/mm/yyyy)"), "utf-8")
+    with pytest.raises(TwoReadingsError, match="day/month/year or month/day/year"):
+        read(path)
+
+
+@pytest.mark.parametrize(("said", "form"), [("dd/mm/yyyy", "%m/%d/%Y %H:%M"), ("yyyy-dd-mm", "%Y-%m-%d %H:%M")])
+def test_no_row_is_skipped_because_of_a_wrong_heading(said: str, form: str, tmp_path: Path) -> None:
+    """The 13th of a month is no date in the order that is stated, the rows before it are."""
+    days = [t for d in (11, 12, 13) for t in series(datetime(2024, 3, d, 8), timedelta(hours=1), 4)]
+    path = written(tmp_path / "wrong.csv", days, form)
+    path.write_text(path.read_text("utf-8").replace("Timestamp", f"Time ({said})"), "utf-8")
+    with pytest.raises(TwoReadingsError, match=r"'.*13.*' is not \w+/\w+/\w+, which the heading specifies") as caught:
+        read(path)
+    as_it_was(read(path, check_content(dict(caught.value.remedies[0]), "m")), days)
+    assert run(["map", str(path), "--yes"]) == 2
+
+
+@pytest.mark.parametrize("points", [False, True])
+@pytest.mark.parametrize("two", [False, True])
+def test_heading_and_row_of_units_that_disagree(points: bool, two: bool, tmp_path: Path) -> None:
+    """Rows that continue decide, with a note; else it is asked for."""
+    path = tmp_path / "both.csv"
+    said = ("dd/mm/yyyy", "mm/dd/yyyy")
+    for heading, unit in (said, said[::-1]):
+        for instants, asks in ((PAUSED, True), (OVER_NIGHT, False)):
+            for form in ("%m/%d/%Y", "%d/%m/%Y"):
+                rows = "".join(
+                    f"{t.strftime(form)}{',' if two else ' '}{t:%H:%M},{20 + k / 9:.2f},{k}\n"
+                    for k, t in enumerate(instants)
+                )
+                clock = ("Time,", "hh:mm,") if two else ("", "")
+                head = f"Date ({heading}),{clock[0]}T1,Z\n{unit},{clock[1]}degC,um\n"
+                path.write_text((head + rows).replace("/", "." if points else "/"), "utf-8")
+                if not asks:
+                    recording = read(path)
+                    as_it_was(recording, instants)
+                    assert any("the dates are" in note and "otherwise a gap" in note for note in recording.notes)
+                    continue
+                with pytest.raises(TwoReadingsError, match="heading and row of units contradict each other") as caught:
+                    read(path)
+                assert all(hours in str(caught.value) for hours in ("51.25 h", "1467.25 h"))
+                read_as = [check_content(dict(way), "m") for way in caught.value.remedies]
+                assert sorted(read(path, way).time[-1] / 3600 for way in read_as) == [51.25, 1467.25]
+                date = {"time": {"column": "Time" if two else f"Date ({heading})", "format": read_as[0].time.format}}
+                if points:
+                    date["time"]["column"] = date["time"]["column"].replace("/", ".")
+                date["time"] |= {"date": f"Date ({heading})".replace("/", "." if points else "/")} if two else {}
+                assert read(path, check_content(date, "m")).time[-1] == read(path, read_as[0]).time[-1]
+
+
+def test_points_whose_order_nothing_shows_are_noted(tmp_path: Path) -> None:
+    tests = [t for m in (5, 6) for t in series(datetime(2024, m, 3, 8), timedelta(minutes=30), 17)]
+    notes = read(written(tmp_path / "points.csv", tests, "%d.%m.%Y %H:%M")).notes
+    assert "the dates are day/month/year: dates with points usually have the day first" in notes
 
 
 def test_text_in_a_workbook_goes_on_too(tmp_path: Path) -> None:

@@ -274,6 +274,40 @@ def test_tests_on_several_days_are_not_asked_for_the_unit_of_their_times(tmp_pat
     assert 'unit = "ms"' not in mapping
 
 
+@pytest.mark.parametrize(
+    ("said", "seconds"), [("hh:mm", 60), ("[HH:MM]", 60), ("h:mm", 60), ("mm:ss", 1), ("(m:ss)", 1), ("MM:SS", 1)]
+)
+@pytest.mark.parametrize("below", [True, False])
+def test_a_time_of_two_parts_is_read_as_stated(said: str, seconds: int, below: bool, tmp_path: Path) -> None:
+    body = "".join(f"{k // 60 + 58:02}:{k % 60:02},{20 + k / 80},{k / 4}\n" for k in range(150))
+    head = f"Time,T1,Z\n{said},degC,um\n" if below else f"Time ({said.strip('[]()')}),T1 [degC],Z [um]\n"
+    path = write(tmp_path, head + body)
+    recording = read(path)
+    assert recording.time.tolist() == [float(k * seconds) for k in range(150)]
+    assert any("as the heading specifies" in note for note in recording.notes)
+    form = "%H:%M" if seconds == 60 else "%M:%S"
+    assert f"is read as {form}" in " ".join(recording.notes)
+
+
+def test_a_mapping_of_the_time_without_its_form_still_fits(tmp_path: Path) -> None:
+    path = write(tmp_path, "Time,T1,Z\nmm:ss,degC,um\n" + "".join(f"00:{k:02},{20 + k},{k}\n" for k in range(30)))
+    mapping = check_content({"time": {"column": "Time", "format": "%H:%M"}}, "m")
+    assert read(path, mapping).time[-1] == 29 * 60
+
+
+@pytest.mark.parametrize(("said", "cell"), [("hh:mm", "00:01:30"), ("mm:ss", "00:75"), ("mm:ss", "01:02:03")])
+def test_a_stated_form_that_a_row_does_not_have_is_refused(said: str, cell: str, tmp_path: Path) -> None:
+    body = "".join(f"00:{k:02},{20 + k},{k}\n" for k in range(30))
+    with pytest.raises(InputError, match=f"'{cell}' is not a time like '00:00'"):
+        read(write(tmp_path, f"Time,T1,Z\n{said},degC,um\n{body}{cell},50,30\n"))
+
+
+def test_a_time_of_day_beside_a_date_keeps_its_name(tmp_path: Path) -> None:
+    path = write(tmp_path, "Date,Time,T1,Z\n-,hh:mm,degC,um\n" + rows("%d/%m/%Y,%H:%M"))
+    with pytest.raises(TwoReadingsError, match=r'\[time\] column = "Time", date = "Date" and format'):
+        read(path)
+
+
 def test_a_sign_may_stand_apart_from_its_number(tmp_path: Path) -> None:
     cells = "".join(
         f"{t:%Y/%m/%d,%H:%M:%S},+   {a:.1f},-  {z:.1f}\n" for t, (a, z) in zip(INSTANTS, CELLS, strict=True)

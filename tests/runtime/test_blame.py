@@ -58,7 +58,7 @@ def swapped(samples: Samples) -> FloatArray:
 def test_every_pair_is_named_once_its_responses_differ(watch: Watch, samples: Samples) -> None:
     """Soon after the first lasting difference by more than both limits, but for one pair in which both are off alone.
 
-    Of 224 pairs in 16 recordings of other seeds, 223 are named; in the other one, too, only sensors of the pair are off.
+    Of 224 pairs in 16 recordings of other seeds, 223 are named; in the other one, only sensors of the pair are off.
     """
     found, when, _ = run(watch, samples, swapped(samples))
     assert not found[0].any()

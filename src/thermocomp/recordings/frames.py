@@ -33,7 +33,7 @@ def parts_of(
     labelled = cycles if isinstance(cycles, str) else "cycle" if cycles is None and "cycle" in columns else None
     if labelled is not None and labelled not in columns:
         raise InputError(f"{name}: cycles: no column is named {labelled!r}; there are {', '.join(columns)}")
-    clock, start, used = _time(plain, time, units, name)
+    clock, start, used, unit = _time(plain, time, units, name)
     data: dict[str, FloatArray] = {}
     aliases: dict[str, str] = {}
     channels, notes = [], []
@@ -65,11 +65,14 @@ def parts_of(
         "start": start,
         "aliases": aliases,
         "notes": tuple(notes),
+        "time_unit": unit,
     }
 
 
-def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) -> tuple[FloatArray, str, str | None]:
-    """Return the time since the first row [s], the time stamp of the first row, and the column of the time."""
+def _time(
+    table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str
+) -> tuple[FloatArray, str, str | None, str]:
+    """Return the time since the first row [s], the time stamp of the first row, and column and unit of the time."""
     used = None
     symbol = "s"
     if given is None:
@@ -101,9 +104,11 @@ def _time(table: pd.DataFrame, given: Any, units: Mapping[str, str], name: str) 
         raise RecordingError(f"{name}: the time is missing in row {wrong[0]}")
     first = values[0]
     if isinstance(first, datetime | np.datetime64):
-        return passed, pd.Timestamp(first).isoformat(), used
-    scale = 1.0 if isinstance(first, timedelta | np.timedelta64) else find_unit(symbol, "time").scale
-    return (passed - passed[0]) * scale, "", used
+        return passed, pd.Timestamp(first).isoformat(), used, "timestamp"
+    if isinstance(first, timedelta | np.timedelta64):
+        return passed - passed[0], "", used, "timestamp"
+    unit = find_unit(symbol, "time")
+    return (passed - passed[0]) * unit.scale, "", used, unit.symbol
 
 
 def _meaning(column: str, units: Mapping[str, str]) -> Meaning | None:

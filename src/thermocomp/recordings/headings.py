@@ -168,18 +168,37 @@ def is_time_name(heading: str) -> bool:
 
 
 def plain_name(heading: str) -> str:
-    """Return a heading in lower case without a date format: ``Datum (TT.MM.JJJJ)`` becomes ``datum``."""
+    """Return a heading in lower case without date formats: ``Datum (TT.MM.JJJJ)`` becomes ``datum``."""
+    return " ".join(strip_format(strip_format(heading)).casefold().split())
+
+
+def strip_format(heading: str) -> str:
+    """Return a heading without the date format in brackets at its end."""
     name = strip_heading(heading)
     found = BRACKETS.fullmatch(name)
-    if found and _FORMAT.fullmatch((found["square"] or found["round"] or "").strip()):
-        name = found["base"]
-    return " ".join(name.casefold().split())
+    is_format = found and _FORMAT.fullmatch((found["square"] or found["round"] or "").strip())
+    return found["base"] if found and is_format else name
+
+
+def find_date_orders(heading: str) -> tuple[str, ...]:
+    """Return the orders of day, month and year in a heading, such as ``dmy``; two where a row of units disagrees."""
+    inner = strip_format(heading)
+    found = (find_date_order(heading), find_date_order(inner) if inner != strip_heading(heading) else "")
+    return tuple(dict.fromkeys(order for order in found if order))
+
+
+def find_clock_form(heading: str) -> str:
+    """Return the format of times of two parts in the brackets of a heading: ``hh:mm`` or ``mm:ss``; else empty."""
+    found = BRACKETS.fullmatch(strip_heading(heading))
+    form = ((found["square"] or found["round"] or "") if found else heading).strip().casefold()
+    return "%H:%M" if re.fullmatch("h+:m+", form) else "%M:%S" if re.fullmatch("m+:s+", form) else ""
 
 
 def find_date_order(heading: str) -> str:
     """Return the order of day, month and year in a heading, such as ``dmy``; empty if it specifies none."""
     found = BRACKETS.fullmatch(strip_heading(heading))
-    letters = re.findall(r"[a-z]+", ((found["square"] or found["round"]) if found else heading).casefold())
+    form = ((found["square"] or found["round"]) if found else heading).casefold()
+    letters = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])t(?=hh?\b)", " ", form))  # yyyy-mm-ddThh:mm
     if not all(re.fullmatch(r"([dtgmyjahsf])\1*|[ap]m?", word) for word in letters):
         return ""
     german = any(word[0] == "t" for word in letters)

@@ -53,6 +53,9 @@ class Recording:
     compensation : {'', 'off', 'known', 'unknown'}
         ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
         have been; empty: not specified. See `thermocomp.recordings.compensated`.
+    time_unit : str
+        Unit that the source file states for its times, ``timestamp`` for dates and times of day; empty if a mapping
+        states it.
 
     Examples
     --------
@@ -79,6 +82,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     compensation: str = ""
+    time_unit: str = "s"
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.table):

@@ -51,6 +51,8 @@ class Rows:
         Changes of the values by a mapping.
     compensation : str
         Whether a correction was in force, see `Recording`.
+    time_unit : str
+        Unit that the file states for its times, see `Recording`.
     """
 
     source: str
@@ -69,6 +71,7 @@ class Rows:
     notes: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     compensation: str = ""
+    time_unit: str = "s"
 
     def kept(self, rows: IntArray) -> "Rows":
         """Return only the rows with the given indices."""

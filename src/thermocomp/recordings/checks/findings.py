@@ -77,11 +77,16 @@ class Signal:
         return self.values[self.good]
 
     @cached_property
-    def span(self) -> float:
-        """Range of a running median over 21 usable rows, or all if fewer; range of the usable values if this is 0."""
+    def smooth(self) -> FloatArray:
+        """Running median over 21 good rows, or all if fewer."""
         width = min(21, (len(self.x) - 1) // 2 * 2 + 1)
-        smooth = pd.Series(self.x).rolling(width, center=True, min_periods=(width + 1) // 2).median().to_numpy()
-        return float(np.ptp(smooth)) or float(np.ptp(self.x))
+        median = pd.Series(self.x).rolling(width, center=True, min_periods=(width + 1) // 2).median()
+        return median.to_numpy(dtype=np.float64)
+
+    @cached_property
+    def span(self) -> float:
+        """Range of the smooth values; range of the good values if this is 0."""
+        return float(np.ptp(self.smooth)) or float(np.ptp(self.x))
 
     @cached_property
     def noise(self) -> float:

@@ -23,6 +23,7 @@ from thermocomp.recordings.checks.findings import (
 from thermocomp.recordings.checks.jumps import jumps
 from thermocomp.recordings.checks.spikes import spikes
 from thermocomp.recordings.checks.stuck import stuck
+from thermocomp.recordings.checks.timeunits import time_unit
 from thermocomp.recordings.compensated import UNKNOWN
 from thermocomp.recordings.cycles import SPLITS
 from thermocomp.recordings.recording import Recording
@@ -63,7 +64,9 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         signal, mine = _channel(channel, values, time, moved, probed=channel.name in probed)
         found += mine
         signals.append(signal)
-    found += _together(signals, time, moved, speed, stamped=bool(recording.start))
+    found += _together(signals, time, moved, speed)
+    if not recording.start:  # times from stamps have no unit
+        found += time_unit(time, [s for s in signals if s.channel.quantity == "temperature"], recording.time_unit)
     return tuple(sorted(found, key=lambda f: SEVERITIES.index(f.severity)))
 
 
@@ -94,14 +97,12 @@ def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def _together(
-    signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None, *, stamped: bool
+    signals: Sequence[Signal], time: FloatArray, moved: BoolArray, speed: FloatArray | None
 ) -> Iterator[Finding]:
-    """Yield findings on several channels together; the time unit is checked unless the times are time stamps."""
+    """Yield joint findings of several channels, or of a channel and the clock."""
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
-    if not stamped:
-        yield from suspects.time_unit(time, of["temperature"])
     yield from suspects.zeros([*of["displacement"], *of["angle"]], time)
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))

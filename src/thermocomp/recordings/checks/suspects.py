@@ -101,55 +101,6 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
 
 
-def time_unit(time: FloatArray, temperatures: Sequence[Signal]) -> Iterator[Finding]:
-    """Yield a finding on a time that must be in ms although the heading specifies s.
-
-    Intervals of over an hour (median) do not resolve a warm-up and are not used in practice. If intervals of one or two
-    seconds are read as 17 or 33 min, the sensors reveal it: the shortest time in which a temperature moves by half its
-    span is minutes to hours on a machine. Over a day for three quarters of the sensors is trouble. Sensors that change
-    by less than 1 degC, or less than 10 times their noise, are ignored; if none is left, ms are detected only at
-    intervals of over 3.6 s.
-
-    Parameters
-    ----------
-    time : ndarray of shape (n_rows,)
-        [s]
-    """
-    if len(time) < 10:
-        return
-    interval = float(np.median(np.diff(time)))
-    fastest = 0.0
-    if interval <= 3600 and time[-1] - time[0] > 86400:
-        times = [t for s in temperatures if (t := _half_span_time(s, time)) is not None]
-        fastest = float(np.quantile(times, 0.25)) if times else 0.0
-    if interval > 3600:
-        told = f"rows are {interval:.6g} s ({interval / 3600:.3g} h) apart"
-    elif fastest > 86400:
-        told = f"most temperatures take more than {fastest / 86400:.3g} days for half of their range"
-    else:
-        return
-    text = (
-        f"the test would last {(time[-1] - time[0]) / 86400:.4g} days, and {told}: no warm-up is that slow. Are the "
-        'times in ms? Then state it in a mapping: [time] unit = "ms"'
-    )
-    yield Finding("trouble", "", "time unit", text, remedy={"time": {"unit": "ms"}})
-
-
-def _half_span_time(signal: Signal, time: FloatArray) -> float | None:
-    """Return the shortest time in which a signal moves by half its span [s]; None if it does not move enough."""
-    x, t = signal.x, time[signal.good]
-    if len(x) < 10:
-        return None
-    span = signal.span
-    if span < max(1.0, 10 * signal.noise):
-        return None
-    for rows in np.unique(np.geomspace(1, len(x) - 1, 60).astype(int)):
-        moved = np.abs(x[rows:] - x[:-rows]) >= 0.5 * span
-        if moved.any():
-            return float((t[rows:] - t[:-rows])[moved].min())
-    return None
-
-
 def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
     """Yield findings on displacements and tilts with an offset at the start: continued recording, or probe not zeroed.
 

@@ -11,7 +11,9 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import find_unit, is_unit
 from thermocomp.recordings.headings import (
     BRACKETS,
+    find_clock_form,
     find_date_order,
+    find_date_orders,
     is_foreign_unit,
     is_time_name,
     is_understood,
@@ -26,6 +28,8 @@ _TIME = re.compile(
     r"|(?:\d+ days? )?\d{1,4}:\d\d)"
     r"(?!\d)[-\dT.,:+ ]*(?:[AaPp]\.?[Mm]\.?)?(?: ?[A-Z]{1,4})?(?:[+-]\d\d:?\d\d)?|\d{8}T\d{4,6}[\dZ.,+:-]*"
 )
+#: a time that may be hours and minutes or minutes and seconds
+_CLOCK = re.compile(r"\d+:\d\d")
 #: maximum number of characters of a date with a time of day
 _LONGEST = 60
 #: minimum fraction of the numeric columns with a value in a row of the table
@@ -154,15 +158,19 @@ def join_units(
     """Add the units of row `number` of a file to the headings above them that have none.
 
     The contents of a column decide: dates, times of day and words have no unit, whatever the row contains (``Unit``,
-    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept. The first column may contain a label of the row.
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept, and the form of a time that may be hours and
+    minutes or minutes and seconds. The first column may contain a label of the row.
     """
     said = [_bare(unit) for unit in units]
+    cells = [next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "") for k in range(len(headings))]
+    dated = any(is_stamp(cell) and not _CLOCK.match(cell) for cell in cells)  # then a time of day is beside the date
     found = []
-    for k, heading in enumerate(headings):
+    for k, (heading, cell) in enumerate(zip(headings, cells, strict=True)):
         unit = said[k] if k < len(said) else ""
         known = is_unit(unit) or is_foreign_unit(unit)
-        cell = next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "")
-        if is_stamp(cell):
+        if is_stamp(cell) and _CLOCK.fullmatch(cell.strip()) and not dated:
+            fits = bool(find_clock_form(unit))
+        elif is_stamp(cell):
             fits = bool(find_date_order(unit))
         elif k == 0 or is_time_name(heading) or (cell and not is_number_like(cell)):
             fits = known
@@ -174,8 +182,14 @@ def join_units(
                 f"{where}, column {k + 1}: the heading {heading!r} specifies {own}, row {number} below it {unit!r}: "
                 f"correct the wrong one; if it is row {number}, give a mapping with [read] skip = [{number}]"
             )
-        found.append(f"{heading} [{unit}]" if fits and heading and not BRACKETS.fullmatch(heading) else heading)
+        added = not BRACKETS.fullmatch(heading) or (is_stamp(cell) and _states_other_order(heading, unit))
+        found.append(f"{heading} [{unit}]" if fits and heading and added else heading)
     return found
+
+
+def _states_other_order(heading: str, unit: str) -> bool:
+    """Return whether heading and row of units specify different orders of day and month, of which rows decide."""
+    return len(find_date_orders(f"{heading} [{unit}]")) > 1
 
 
 def _contradicted(heading: str, symbol: str) -> str:

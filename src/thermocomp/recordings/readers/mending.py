@@ -16,6 +16,7 @@ from thermocomp.files.plaintext import read_text
 from thermocomp.files.tomlfile import MOST
 from thermocomp.recordings.checks.findings import Finding, cut
 from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.checks.timeunits import confirm
 from thermocomp.recordings.readers.datecheck import holds_date, holds_own_date
 from thermocomp.recordings.readers.guesses import guess_columns, understand_or_none
 from thermocomp.recordings.readers.mapping import ADAPTER, ColumnMap, Mapping, check_content, read_mapping
@@ -72,7 +73,8 @@ Decide = Callable[[Question], Remedy | None]
 def take_best(question: Question) -> Remedy | None:
     """Return the most likely option; None for warnings and infos, and where only the user can decide.
 
-    The user decides on steps that shift, offset or exchange values, and on times with several likely interpretations.
+    The user decides on steps that shift, offset or exchange values, on times with several likely interpretations, and
+    on units of time that are stated but implausible.
     """
     if not question.may_guess:
         return None
@@ -169,7 +171,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
         for f in check(recording):
             if f.remedy is not None:
                 way = located(f, recording, mapping, table.headings)
-                dialogue.ask(Question(f"{f.channel} {f.text}".strip(), (way,), f.severity))
+                dialogue.ask_finding(f, way, recording.time_unit)
         if dialogue.draft.text == before:
             break
         recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
@@ -244,6 +246,20 @@ class _Dialogue:
         answer = self.decide(question)
         self.decided.append((question, answer))
         return answer is not None and self.draft.add(answer)
+
+    def ask_finding(self, finding: Finding, way: Remedy, unit: str) -> None:
+        """Have a finding decided; a unit of time that is stated in the file is replaced or confirmed by the user only.
+
+        Parameters
+        ----------
+        unit : str
+            Unit that the file states for its times.
+        """
+        text, timed = f"{finding.channel} {finding.text}".strip(), "unit" in way.get("time", {})
+        options = (way, confirm(unit)) if timed and way != confirm(unit) else (way,)
+        self.ask(Question(text, options, finding.severity, may_guess=not timed))
+        if timed and finding.severity == "trouble" and not self.draft.document.get("time", {}).get("unit"):
+            raise TwoReadingsError(f"{self.path}: {text}", options)
 
     def _skipped(self) -> int:
         return sum(1 for _, answer in self.decided if answer is not None and _skips(answer))

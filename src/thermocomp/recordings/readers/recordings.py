@@ -64,6 +64,7 @@ def read_rows(
 def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[str]) -> Rows:
     table, sha256 = open_table(source, mapping)
     notes = [*table.notes]
+    confirmed = bool(mapping.time.unit)
     if table.embedded:
         described, damage = read_embedded(table.embedded, source)
         mapping = mapping.over(described)
@@ -109,6 +110,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         changed=_shorten(changed, 0),
         place=table.place,
         compensation=mapping.compensation,
+        time_unit="timestamp" if file.is_stamp else "" if confirmed else columns.time_unit or "s",
     )
     return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
 
@@ -166,6 +168,7 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
         notes=(*rows.notes, *rows.changed),
         changed=rows.changed,
         compensation=rows.compensation,
+        time_unit=rows.time_unit,
     )
     return recording.with_cycles(_cycles(recording, labels, rows))
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from thermocomp.recordings.headings import find_date_order
+from thermocomp.recordings.headings import find_date_orders
 from thermocomp.recordings.readers.dateorder import DateChoice, IntArray, find_longest_step, find_order, rises
 from thermocomp.recordings.words import read_word_groups
 
@@ -51,17 +51,16 @@ class AmbiguousDatesError(ValueError):
         Timestamps by format, in the letters of `datetime.strptime`, most likely first.
     orders : list of str
         Each order as text.
+    why : str
+        Reason why none of them is taken.
     """
 
-    def __init__(self, readings: "dict[str, pd.Series[pd.Timestamp]]", orders: list[str]) -> None:
-        super().__init__(" or ".join(orders))
+    def __init__(
+        self, readings: "dict[str, pd.Series[pd.Timestamp]]", orders: list[str], why: str = "no row shows which"
+    ) -> None:
+        super().__init__(f"{' or '.join(orders)}, and {why}")
         self.readings = readings
         self.orders = orders
-
-    def differ(self) -> bool:
-        """Return whether the time between any two rows depends on the order."""
-        first, *others = (np.diff(_instants(stamps)) for stamps in self.readings.values())
-        return any((first != other).any() for other in others)
 
     def tell(self) -> str:
         """Return the first and last time and the duration under each order, as text."""
@@ -82,33 +81,40 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     """
     first = text.iloc[0].strip()
     shape = _STAMP.fullmatch(first)
-    if _ISO.fullmatch(first):
+    said = find_date_orders(heading)
+    if _ISO.fullmatch(first) and (shape is None or "ydm" not in said):
         found = parse(text, "ISO8601")
         if shape is not None:
-            _refuse_other_order(text, shape, "ymd", found)
+            _refuse_other_order(text, shape, "ymd", found, by_heading=False)
         return _parsed(found, first, "ISO8601", ())
     if shape is None or shape["clock"]:
         return None
     plain = _simplify(text, shape)
-    orders = _orders(shape)
-    stated = find_date_order(heading) if len(orders) > 1 else orders[0]
+    orders = _orders(shape, said)
+    stated = [order for order in said if order in orders] if len(orders) > 1 else orders
     notes: tuple[str, ...] = ()
-    if stated in orders:
+    if len(stated) == 1:
+        found = parse(plain, _format(shape, stated[0]))
         if len(orders) > 1:
-            orders, notes = [stated], (f"the dates are {_WORDS[stated]}, as the heading specifies",)
-        _refuse_other_order(plain, shape, stated, parse(plain, _format(shape, stated)))
-    read = {"dmy": parse(plain, _format(shape, "dmy"))} if _has_points(shape) and "dmy" in orders else {}
+            notes = (f"the dates are {_WORDS[stated[0]]}, as the heading specifies",)
+            _refuse_impossible(plain, shape, orders, stated[0], found)
+        _refuse_other_order(plain, shape, stated[0], found, by_heading=len(orders) > 1)
+    orders = stated or orders  # two are stated if the row of units contradicts the heading
+    as_usual = _has_points(shape) and "dmy" in orders and not stated
+    read = {"dmy": parse(plain, _format(shape, "dmy"))} if as_usual else {}
     if not any(_is_one_stretch(stamps) for stamps in read.values()):
         read |= {order: parse(plain, _format(shape, order)) for order in orders if order not in read}
     whole = [order for order, stamps in read.items() if stamps.notna().all()]
     if len(whole) > 1:
-        choice = _choose(shape, {o: _instants(read[o]) for o in whole})
+        instants = {o: _instants(read[o]) for o in whole}
+        choice = _choose(shape, instants) if as_usual else find_order(instants)
         if not choice.order:
             possible = [o for o in whole if rises(_instants(read[o]))] or whole
             # formats with AM and PM usually have the month first
             possible.sort(key=lambda o: not (shape["half"] and o == "mdy"))
             asked = {_shown_format(shape, o): read[o] for o in possible}
-            raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible])
+            why = "heading and row of units contradict each other" if stated else "no row shows which"
+            raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible], why)
         if choice.why:
             notes = (f"the dates are {_WORDS[choice.order]}: {choice.why}",)
         whole = [choice.order]
@@ -120,18 +126,39 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
 
 
-def _refuse_other_order(
-    plain: "pd.Series[Any]", shape: re.Match[str], stated: str, found: "pd.Series[pd.Timestamp]"
+def _refuse_impossible(
+    plain: "pd.Series[Any]", shape: re.Match[str], orders: list[str], stated: str, found: "pd.Series[pd.Timestamp]"
 ) -> None:
-    """Reject an order given by the heading or the year if rows are consecutive only in another order."""
+    """Reject an order given by the heading if a row is no such date and all rows are dates in another order."""
+    if found.notna().all():
+        return
+    read = {o: parse(plain, _format(shape, o)) for o in orders if o != stated}
+    read = {o: stamps for o, stamps in read.items() if stamps.notna().all()}
+    if read:
+        wrong = plain.iloc[int(found.isna().to_numpy().argmax())]
+        why = f"{wrong!r} is not {_WORDS[stated]}, which the heading specifies"
+        raise AmbiguousDatesError({_shown_format(shape, o): s for o, s in read.items()}, [_WORDS[o] for o in read], why)
+
+
+def _refuse_other_order(
+    plain: "pd.Series[Any]", shape: re.Match[str], stated: str, found: "pd.Series[pd.Timestamp]", *, by_heading: bool
+) -> None:
+    """Reject an order given by the heading or the year if rows are consecutive only in another order.
+
+    An order given by the heading is rejected, too, if time increases only in another order.
+    """
     if not (shape["a"].isdigit() and shape["b"].isdigit()) or not found.notna().all():
         return
-    if not find_longest_step(_instants(found)) >= _MONTH:
+    falls = by_heading and not rises(_instants(found))
+    if not falls and find_longest_step(_instants(found)) < _MONTH:
         return
     swapped = "".join({"d": "m", "m": "d"}.get(letter, letter) for letter in stated)
     other = parse(plain, _format(shape, swapped))
     read = {stated: found, swapped: other}
-    if other.notna().all() and find_order({o: _instants(s) for o, s in read.items()})[:2] == (swapped, "going on"):
+    if not other.notna().all():
+        return
+    choice = find_order({o: _instants(s) for o, s in read.items()})
+    if choice.order == swapped and (by_heading or choice.by == "going on"):
         raise AmbiguousDatesError({_shown_format(shape, o): s for o, s in read.items()}, [_WORDS[o] for o in read])
 
 
@@ -159,7 +186,7 @@ def read_days(text: "pd.Series[Any]") -> list[IntArray]:
         read = [parse(plain, "ISO8601")]
     elif (shape := _STAMP.fullmatch(plain.iloc[0])) is not None and not shape["clock"]:
         plain = _simplify(text, shape)
-        read = [parse(plain, _format(shape, order)) for order in _orders(shape)]
+        read = [parse(plain, _format(shape, order)) for order in _orders(shape, ())]
     else:
         return []
     return [_instants(stamps) // 86_400_000_000_000 for stamps in read if stamps.notna().all()]
@@ -204,9 +231,9 @@ def _choose(shape: re.Match[str], read: dict[str, IntArray]) -> DateChoice:
     choice = find_order(read)
     if not _has_points(shape) or "dmy" not in read:
         return choice
-    day_first = DateChoice("dmy", "", "")  # as is usual for dates with points
     if choice.order == "dmy":
-        return day_first
+        return DateChoice("dmy", "", "")
+    day_first = DateChoice("dmy", "", "dates with points usually have the day first")
     if choice.by == "going on":
         return choice
     year_first = read.get("ymd")
@@ -226,15 +253,17 @@ def _month(found: re.Match[str]) -> str:
     return _MONTHS.get(found[0].casefold(), found[0])
 
 
-def _orders(shape: re.Match[str]) -> list[str]:
+def _orders(shape: re.Match[str], said: tuple[str, ...]) -> list[str]:
+    """Return the orders that a first cell may have; year, day, month only if the heading says so."""
     a, b, c = shape["a"], shape["b"], shape["c"]
+    rare = ["ydm"] if "ydm" in said and b.isdigit() else []
     if len(a) == 4 and a.isdigit():
-        return ["ymd"]
+        return ["ymd", *rare]
     if not a.isdigit():
         return ["mdy"]
     if not b.isdigit():
         return ["dmy"]
-    return ["dmy", "mdy"] if len(c) == 4 else ["dmy", "mdy", "ymd"]
+    return ["dmy", "mdy"] if len(c) == 4 else ["dmy", "mdy", "ymd", *rare]
 
 
 def _format(shape: re.Match[str], order: str) -> str:

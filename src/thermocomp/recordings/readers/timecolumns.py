@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError, tell_nearest
-from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name
+from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name, strip_format
 from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.dayforms import names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
@@ -77,6 +77,10 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
         )
     if place in headings:
         return list(headings).index(place)
+    # a row of units may have added the format of a date or time
+    bare = [k for k, heading in enumerate(headings) if strip_format(heading) == place]
+    if len(bare) == 1:
+        return bare[0]
     hint = tell_nearest(place, filter(None, headings), cutoff=0.5)
     raise RecordingError(f"{source}: mapping {table}: the file has no column {place!r}; {hint}")
 
@@ -84,7 +88,8 @@ def find_position(place: Place, headings: Sequence[str], table: str, source: str
 def is_ignored(heading: str, index: int, mapping: Mapping) -> bool:
     """Return whether a mapping marks a column as ignored."""
     rules = mapping.columns.items()
-    return any(rule.role == "ignore" and (rule.column or name) in (heading, index + 1) for name, rule in rules)
+    places = (heading, strip_format(heading), index + 1)
+    return any(rule.role == "ignore" and (rule.column or name) in places for name, rule in rules)
 
 
 def find_parts(headings: Sequence[str]) -> list[str]:

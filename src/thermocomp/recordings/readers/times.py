@@ -9,6 +9,7 @@ import pandas as pd
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
+from thermocomp.recordings.headings import find_clock_form
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
 from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, SERIAL
 from thermocomp.recordings.readers.filecells import FileCells
@@ -95,11 +96,10 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
             found = parse_stamps(text, titled)
         except AmbiguousDatesError as e:
             ways = " or ".join(f'format = "{form}"' for form in e.readings)
-            differ = e.differ()
-            raise (TwoReadingsError if differ else RecordingError)(
-                f"{file.source}: {file.table.place(0)}, column {titled!r}: {first!r} can be read as {e}, and no row "
-                f"shows which{f' ({e.tell()})' if differ else ''}; state how it is written in a mapping: [time] "
-                f"{_told(keys)} and {ways}",
+            # also where the duration is the same: the order is wrong for other tests of this logger
+            raise TwoReadingsError(
+                f"{file.source}: {file.table.place(0)}, column {titled!r}: {first!r} can be read as {e} ({e.tell()}); "
+                f"state how it is written in a mapping: [time] {_told(keys)} and {ways}",
                 [{"time": {**keys, "format": form}} for form in e.readings],
             ) from e
     if found is None or pd.isna(found.stamps.iloc[0]):
@@ -150,7 +150,9 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
     first = text.iloc[0].strip()
     halves = HALF.fullmatch(first) is not None
     parts = text.str.strip().str.extract(CLOCK)
-    if not halves and pd.isna(parts["seconds"].iloc[0]):
+    short = not halves and pd.isna(parts["seconds"].iloc[0])
+    form = find_clock_form(file.heading) if short else ""
+    if short and not form:
         raise TwoReadingsError(
             f"{file.at(0)}: {first!r} can be read as hours and minutes or as minutes and seconds; state how it is "
             f'written in a mapping: [time] column = "{file.heading}" and format = "%H:%M" or format = "%M:%S"',
@@ -162,6 +164,12 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
         stamps = parse(upper, form.replace("%S", "%S.%f") if "." in first.upper().rstrip("M.PA ") else form)
         seconds = ((stamps - stamps.dt.normalize()).dt.total_seconds()).to_numpy(dtype=np.float64)
     else:
+        if short:
+            odd = parts["seconds"].notna() | (pd.to_numeric(parts["minutes"]) > 59)
+            _refuse_unlike(odd.to_numpy(), text, f"a time like {first!r}", file)
+            parts["seconds"] = "0"
+        if form == "%M:%S":
+            parts["hours"], parts["minutes"], parts["seconds"] = "0", parts["hours"], parts["minutes"]
         texts = parts["seconds"].str.replace(r"[,:]", ".", regex=True)
         days, hours, minutes, rest = (
             pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64)
@@ -174,11 +182,13 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
     steps = np.diff(whole)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
+    notes: tuple[str, ...] = (f"{file.heading!r} is read as {form}, as the heading specifies",) if short else ()
     if not midnights.any() or whole.max() >= _DAY:
-        return (whole - whole[0]) / 1e9, "", ()
+        return (whole - whole[0]) / 1e9, "", notes
     places = tell_places((np.flatnonzero(midnights) + 1).tolist(), file.table.place)
     days_on = np.concatenate([[0], np.cumsum(midnights)])
-    return (whole - whole[0] + days_on * _DAY) / 1e9, "", (f"the time of day passes midnight in {places}",)
+    notes += (f"the time of day passes midnight in {places}",)
+    return (whole - whole[0] + days_on * _DAY) / 1e9, "", notes
 
 
 def _read_numbers(raw: FloatArray, file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
