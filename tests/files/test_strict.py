@@ -233,7 +233,7 @@ def test_what_is_no_plain_file_is_refused_and_nothing_waits(tmp_path: Path) -> N
         for read in (modelfile.read, read_machine, read_mapping):
             with pytest.raises(InputError, match=r"it is a folder, a pipe or a device"):
                 read(tmp_path / name)
-    with pytest.raises(ModelFileError, match=r"is not the name of a model file: embedded null"):
+    with pytest.raises(ModelFileError, match=r"cannot be the name of a model file: embedded null"):
         modelfile.read(f"{tmp_path}/a\0b")
 
 

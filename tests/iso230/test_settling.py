@@ -104,7 +104,7 @@ def test_what_cannot_be_known_is_said() -> None:
     assert not creeping.one.reliable  # longer than what was recorded
 
     still = settle(TIME, jitter, "x", "um", PHASE)
-    assert still.words == "does not move"
+    assert still.words == "does not change"
     assert still.one is None
     assert np.isnan(still.t90)
 

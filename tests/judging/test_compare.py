@@ -103,7 +103,7 @@ def test_a_method_that_cannot_be_fitted_is_refused_not_hidden(recording: Recordi
     result = compare(broken, ["ols"], splits.parse("0.75/0.25", broken))
     (a,) = result.assessments
     assert not a.accepted
-    assert "could not be judged: ols: 2 complete training rows of z_um" in a.reason
+    assert "could not be judged: ols: only 2 complete training rows of z_um; at least 3" in a.reason
     assert np.isnan(a.metric("rms"))
 
 

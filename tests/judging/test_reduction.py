@@ -59,7 +59,7 @@ def test_a_machine_with_a_memory_loses_too_much() -> None:
     assert r.model.honest_error.word == "accepted"
     assert r.loss == pytest.approx(r.reduced.rms / r.full.rms)
     assert r.loss > 5
-    assert "loses too much: RMS 3.5" in r.why_not(2.0)
+    assert "loses too much accuracy: RMS 3.5" in r.why_not(2.0)
     assert r.why_not(10.0) == ""
 
 

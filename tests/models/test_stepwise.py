@@ -188,13 +188,13 @@ def test_what_fixed_thresholds_mean_depends_on_the_rows() -> None:
 @pytest.mark.parametrize("thresholds", [(50.0, 100.0), (1.0, -1.0), (np.nan, 1.0)])
 def test_f_to_enter_below_f_to_delete_is_refused(thresholds: tuple[float, float]) -> None:
     # E-T4
-    with pytest.raises(InputError, match="for ever"):
+    with pytest.raises(InputError, match="endlessly"):
         FThresholds(*thresholds)
 
 
 @pytest.mark.parametrize("alphas", [(0.05, 0.01), (0.0, 0.1), (0.1, 1.5), (np.nan, 0.1)])
 def test_alpha_to_enter_above_alpha_to_remove_is_refused(alphas: tuple[float, float]) -> None:
-    with pytest.raises(InputError, match="for ever"):
+    with pytest.raises(InputError, match="endlessly"):
         AlphaThresholds(*alphas)
 
 

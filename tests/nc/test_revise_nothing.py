@@ -71,7 +71,7 @@ def test_what_held_all_of_it_is_named(job_folder: Path, capsys: pytest.CaptureFi
     Path("part.ngc").write_text("G21 G90 G17 G54 G94\nS4000 M3\nG1 X10 F50\nG2 X0 I-5\n" * 99 + "M2\n", "ascii")
     assert revise("--every", "5 h") == 1
     text = out(capsys)
-    assert "held by the time between updates; change that in the program, or try --method offset" in text
+    assert "held because of the time between updates; change that in the program, or try --method offset" in text
 
 
 def test_a_hole_that_is_corrected_counts(job_folder: Path) -> None:

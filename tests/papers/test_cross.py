@@ -158,7 +158,7 @@ def test_a_method_that_does_harm_is_a_finding() -> None:
     (bad,) = cross.measured([made("none", 5.0), made("ols", 6.0), made("mlp", 2.0)])
     assert bad.ids == ("X-02", "X-03")
     assert bad.holds is False
-    assert "Worse than none: ols 6.0 um." in bad.finding
+    assert "Worse than no compensation: ols 6.0 um." in bad.finding
 
 
 def test_methods_are_known_and_unknown_ones_refused() -> None:

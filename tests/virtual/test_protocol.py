@@ -166,7 +166,7 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
         ({"duration": Lot(one_of=(20.0, 25.0))}, ("duration",), "25 s is not a multiple"),
         ({"segments": (Stretch(), Stretch(duration=5.0))}, ("segments", 1, "duration"), "5 s is not a multiple"),
         ({"soak": Stretch(speed=100.0)}, ("soak", "duration"), "missing"),
-        ({"copies": 0}, ("copies",), "from 1 to"),
+        ({"copies": 0}, ("copies",), "expected 1 to 10000 copies, found 0"),
         ({"weight": 2.0}, ("weight",), "applies only"),
     ],
 )
