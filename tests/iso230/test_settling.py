@@ -108,10 +108,10 @@ def test_what_cannot_be_known_is_said() -> None:
     assert still.one is None
     assert np.isnan(still.t90)
 
-    assert settle(TIME, np.full(TIME.size, 3.0), "x", "um", PHASE).words == "does not move"
+    assert settle(TIME, np.full(TIME.size, 3.0), "x", "um", PHASE).words == "does not change"
 
     bump = settle(TIME, 10 * (rise(900) - rise(3000)) + jitter, "x", "um", PHASE)
-    assert bump.words == "comes back"
+    assert bump.words == "returns"
     assert np.isnan(bump.t63)
 
 

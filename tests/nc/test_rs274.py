@@ -192,9 +192,7 @@ def test_refused_with_line_and_words(run: Run, text: str, line: int, reason: str
 
 def test_an_endless_loop_ends(run: Run) -> None:
     # whatever is reached first
-    with pytest.raises(
-        ProgramError, match="takes more than 1 s to interpret: check it for an endless loop|have no end"
-    ):
+    with pytest.raises(ProgramError, match=r"takes more than 1 s to interpret|seems to have no end"):
         run("G21\n#1 = 1\no1 while [#1 GT 0]\nG0 X#1\no1 endwhile\nM2\n", seconds=1)
 
 
