@@ -213,7 +213,10 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         (HEAD + 'segments = [{duration = "1 min", powered = "no"}]', "must be true or false, without quotes"),
         (BODY + "perfect = 1", "key 'perfect' = 1: must be true or false"),
         (HEAD + 'segments = [{duration = "1 min", speed = true}]', "must be a value other than true and false"),
-        (HEAD + 'segments = [{duration = "1 min", speed = "1000"}]', "write the number without quotes"),
+        (
+            HEAD + 'segments = [{duration = "1 min", speed = "1000"}]',
+            "expected a number, found the text '1000'; write it without quotes",
+        ),
         (BODY + "climate = {mean = 1e6}", "1e+06 degC: must be from -30 to 60"),
         (
             BODY + 'touch = {every = "1 h", noise = -3, points = {a = [0, 0, 0]}}',

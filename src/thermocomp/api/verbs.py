@@ -84,8 +84,8 @@ def compare(
     margin : float
         Margin by which the training range of each input is extended at both ends, as a fraction of the range.
     robustness : bool
-        Also replay the models with sensor noise and lost sensors: a model that is then worse than no compensation is
-        unproven. Computing is faster without this check, but then no model is accepted.
+        Also evaluate the models with added sensor noise and with failed sensors: a model that is then worse than no
+        compensation gets the verdict ``unproven``. Without this check the command is faster, but accepts no model.
     primary : str, optional
         Primary method, chosen before the evaluation: its result is not corrected for multiple comparisons, those of the
         other methods are corrected for the number of methods tried. Default: the recommended method, selected again in

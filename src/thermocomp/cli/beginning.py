@@ -33,7 +33,8 @@ class Beginning:
         Time from the end of each file of `--continues` to the start of the next one [s]. Default: from the time stamps,
         else one sampling interval.
     zero : str
-        Temperatures of a known zero, such as t1_C=20.1,t2_C=20.4, or a recording at whose start they were measured.
+        Temperatures at which the displacements were zeroed, such as t1_C=20.1,t2_C=20.4, or a recording that starts at
+        these temperatures.
     """
 
     start: Literal["cold", "continued", "rezeroed", "known"] | None = None

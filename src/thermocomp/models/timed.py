@@ -317,7 +317,10 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
             f"test was left out: {_WHOLE}; {_OURS}"
         )
     if not hasattr(dt, "index") and get_config()["enable_metadata_routing"]:
-        raise InputError(f"{name}: give dt as a pandas Series, pd.Series(dt): its index shows rows that were left out")
+        raise InputError(
+            f"{name}: dt has no index, so missing rows cannot be detected; give pd.Series(dt), made before rows are "
+            "left out"
+        )
     _refuse_holes(getattr(dt, "index", None), np.isinf(step))
     return step
 

@@ -150,14 +150,15 @@ class Shift(Step):
 
 @dataclass(frozen=True)
 class Rezero(Step):
-    """Offset a probe's values from a time on, for a probe that was displaced or zeroed during a test.
+    """Offset the values of a probe from a given time onwards, because it was displaced or zeroed during a test.
 
     Parameters
     ----------
     at : float or str
         Time of the first row that is offset.
     to : float, optional
-        New value at this row, in the house unit. Default: the channel continues its previous course.
+        New value at this row [internal unit of the channel]. Default: the step is removed, so that the channel is
+        continuous.
     until : float or str, optional
         Time of the first row that is no longer offset. Default: the rest of the test is offset.
     """

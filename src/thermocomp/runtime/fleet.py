@@ -62,7 +62,7 @@ class Fleet:
         zero = np.array(self.zeros, dtype=np.float64)
         if zero.ndim != 2 or zero.shape[1] != len(model.inputs):
             raise InputError(
-                f"zeros: expected finite values of shape (n_machines, {len(model.inputs)}), got shape {zero.shape}"
+                f"zeros: expected shape (n_machines, {len(model.inputs)}), one row per machine, got {zero.shape}"
             )
         if not np.isfinite(zero).all():
             raise InputError(

@@ -99,7 +99,7 @@ def _check_types(value: Any, path: Keys) -> None:
         if isinstance(value, bool) and key not in SWITCHES:
             raise SettingError("must be a value other than true and false", path)
         if isinstance(value, str) and key not in TEXTS and re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", value):
-            raise SettingError("write the number without quotes", path)
+            raise SettingError(f"expected a number, found the text {value!r}; write it without quotes", path)
 
 
 def _in_house_units(content: dict[str, Any]) -> dict[str, Any]:
