@@ -280,7 +280,7 @@ def test_routed_by_scikit_learn(tests: Samples) -> None:
         assert not said
         nothing, said = scores(requested, X, y, cv=leave, params={**params, "dt": tests.dt()})
         assert np.isnan(nothing).all()
-        assert "give dt as a pandas Series" in said
+        assert "dt has no index, so missing rows cannot be detected; give pd.Series(dt)" in said
         # a scorer by name passes nothing on to predict
         nothing, said = scores(requested, X, y, cv=leave, params=params, scoring="neg_root_mean_squared_error")
         assert np.isnan(nothing).all()
