@@ -6,7 +6,7 @@ compared between numpy, step by step, and the replay of a whole test (`runtime.b
 `Fleet` with as many compensators as it has machines. Decisions are equal; numbers to rounding.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -29,15 +29,16 @@ from thermocomp.runtime.fleet import Fleet
 from thermocomp.runtime.program.tables import Tables, gather
 
 FloatArray = NDArray[np.float64]
-#: of an ordinary run, and of a long one: seeds of compensators, and readings of each
-SHORT, LONG = (range(1, 17), 640), (range(1000, 1200), 5000)
+#: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults
+#: that the others do not: in the return of a sensor, in the rate of a fade, and in the exclusion of swaps
+SHORT, LONG = ((*range(1, 14), 34, 38, 42), 640), (range(1000, 1200), 5000)
 #: of an ordinary run in structured text
 IN_TEXT = (range(1, 6), 200)
 #: smallest difference that counts [um]
 FLOOR = 1e-9
 
 
-def seeds(short: range, long: range) -> list[object]:
+def seeds(short: Sequence[int], long: range) -> list[object]:
     """Return the seeds of an ordinary run, and of a long one."""
     return [*short, *(pytest.param(s, marks=pytest.mark.long) for s in long)]
 
@@ -185,7 +186,7 @@ def undriven_by_nobody(count: int) -> NDArray[np.bool_]:
     return np.zeros((count, 1), dtype=np.bool_)
 
 
-@pytest.mark.parametrize("seed", seeds(range(6), range(3000, 3040)))
+@pytest.mark.parametrize("seed", seeds((*range(5), 22), range(3000, 3040)))
 def test_a_fleet_is_as_many_compensators(seed: int) -> None:
     model, limits, plant = draw_fleet(seed)
     rng, count, machines = np.random.default_rng((6, seed)), 200 if seed < 3000 else 1000, 3
