@@ -167,7 +167,7 @@ def test_the_state_of_sixteen_sensors_with_a_watch_takes_20_kilobytes(tmp_path: 
     (page,) = (
         text for name, text in stpackage.write_package(sixteen(), "x", FACTS, "scl").items() if name[-3:] == ".md"
     )
-    assert int(re.findall(rb"optimized data: (\d+) kB", page)[0]) >= sizes[0] // 1000
+    assert int(re.findall(rb"(\d+) kB per instance", page)[0]) >= sizes[0] // 1000
 
 
 @needs_compiler

@@ -341,6 +341,9 @@ class Compensator:
         """Return the reading with substitutes for temperatures that are not trusted."""
         values, states = reading.values, list[WatchState]()
         for lookout, before in zip(self._lookouts, state.watches, strict=True):
+            if state.time is None and (time < before.time or time < before.averaged.last):
+                # the clock was set back before a reading was used: no other clock is known yet
+                before = begin(lookout.watch)  # noqa: PLW2901
             seen, values = lookout.believe(before, time, values)
             states.append(seen)
         if values is reading.values:
