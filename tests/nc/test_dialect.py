@@ -325,7 +325,14 @@ def test_habits_answer_for_lengths_only() -> None:
         "; PROGRAM O1234",
         "%\n; O 1234 - side 2",
         "; job :1234 of today",
-        "; finishing\n; see O77",
+        "; finishing\n; see O770",
+        "; the plate\n(O4005 COVER)",
+        "; PRG-NR. 2207",
+        "; %1234",
+        "; O-1234",
+        "; O1234.NC",
+        "; CONTROL: 0I-MF",
+        "; the plate\n(MACHINE: VF-2SS)",
         "; the plate\n(POST: FANUC 0i)",
         "; haas vf2",
     ],
@@ -336,7 +343,21 @@ def test_text_behind_a_semicolon_with_a_program_number_or_another_control_is_no_
 
 
 @pytest.mark.parametrize(
-    "text", ["; go to X1", "; OP10 roughing", "; 10:30 o'clock", "; ratio 1:2", "; #O1", "; NO1 mill"]
+    "text",
+    [
+        "; go to X1",
+        "; OP10 roughing",
+        "; 10:30 o'clock",
+        "; ratio 1:2",
+        "; #O1",
+        "; NO1 mill",
+        "; O2 sensor side",
+        "; bore o 12 H7",
+        "; hole O10",
+        "; side :2",
+        "; file: 1001.5",
+        "; AUTO 1",
+    ],
 )
 def test_other_text_behind_a_semicolon_is(text: str) -> None:
     assert question(f"{text}\n{BEGIN}X100\n{END}") == ""

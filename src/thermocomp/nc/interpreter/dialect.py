@@ -33,8 +33,14 @@ _BARE = re.compile(r"[XYZIJKABCR][-+]?0*[1-9][0-9]*(?![0-9.])", re.IGNORECASE).s
 # all other lines, without comments and blanks, in upper case, with {} for brackets
 _COMMENT = re.compile(r"\([^()]*\)?")
 _ACTIVE = re.compile(r"\([ \t]*(?:MSG|DEBUG|PRINT|LOG|LOGOPEN|PROBEOPEN)[ \t]*,|LINUXCNC")
-_OTHERS = re.compile(r"\b(?:FANUC|HAAS|MAZAK|MITSUBISHI|BROTHER|OKUMA|SIEMENS|SINUMERIK|HEIDENHAIN|FAGOR)\b")
-_NUMBER_IN_TEXT = re.compile(r"(?<![A-Z0-9#<.])[O:][ \t]*[0-9]{1,8}(?![0-9.])")
+_OTHERS = re.compile(
+    r"\b(?:FANUC|HAAS|MAZAK|MITSUBISHI|MELDAS|BROTHER|OKUMA|SIEMENS|SINUMERIK|HEIDENHAIN|FAGOR|YASNAC|FADAL|SYNTEC|GSK|"
+    r"MAKINO|DOOSAN|DMG|KITAMURA|HURCO|ROBODRILL|VF-?[0-9]+[A-Z]*|[0-9]+I-[MT][A-F]?)\b"
+)
+# a program number in a comment: O or : with at least three digits ("O2 sensor", "side :2"), or the word PROGRAM
+_NUMBER_IN_TEXT = re.compile(
+    r"(?<![A-Z0-9#<.])(?:[O:%][ \t-]*|(?:PROGRAM|PROG|PRG)\b[^0-9]{0,8})[0-9]{3,8}(?![0-9]*\.[0-9])"
+)
 _MARKS = ("\ufeff", "ï»¿")
 _BRACKET = re.compile(r"\[[^\[\]]*\]")
 _HEAD = re.compile(r"(?P<delete>/[1-9]?)?(?:N[0-9]+(?:\.[0-9]+)?)?(?P<again>/[1-9]?)?")
@@ -192,21 +198,20 @@ class _Scan:
         text = text.upper()
         if _ACTIVE.search(text):
             self._hint("a comment for LinuxCNC")
-        self._foreign |= _OTHERS.search(text) is not None
         self._code, *rest = _COMMENT.sub(" ", text).split(";")
+        comments = " ".join([*_COMMENT.findall(text), *rest])
+        self._foreign |= bool(_OTHERS.search(comments) or _NUMBER_IN_TEXT.search(comments))
         block = _squeeze(self._code)
         self._ended = self._ended or (block == "%" and self._began)
         self._began = self._began or bool(block)
         self._block(block)
-        for behind, written in zip(map(_squeeze, rest), rest, strict=True):
+        for behind in map(_squeeze, rest):
             if _NUMBER_ALONE.fullmatch(behind):
                 self._sign("fanuc", _BEGINS)
             elif _WORDS.fullmatch(behind) and not self._ended:
                 self._ask("behind", f"';{behind[:20]}'", _BEHIND)
-            elif behind:
-                self._foreign |= _NUMBER_IN_TEXT.search(written) is not None
-                if not self._ended:
-                    self._commented = self._commented or Place(self._line, self._text, "a comment of LinuxCNC's")
+            elif behind and not self._ended:
+                self._commented = self._commented or Place(self._line, self._text, "a comment of LinuxCNC's")
 
     @property
     def hint(self) -> Place | None:
