@@ -91,9 +91,11 @@ class ZeroMean(NamedTuple):
         return bool(self.recent) and self.last - self.first >= zeroing.span(self.resting)
 
     def add(self, time: float, values: FloatArray, resting: bool) -> "ZeroMean":
-        """Return the mean with one more reading, later than the previous one."""
+        """Return the mean with one more reading; one that is not later than the previous one does not count."""
         if not self.recent:
             return ZeroMean(first=time, last=time, mean=values, recent=(values,), resting=resting)
+        if time <= self.last:
+            return self
         one, two = self.recent[0], self.recent[-1]
         longer = self._replace(before=self.last, last=time, recent=(two, values))
         if len(self.recent) == 1:

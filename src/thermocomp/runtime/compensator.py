@@ -341,7 +341,8 @@ class Compensator:
         """Return the reading with substitutes for temperatures that are not trusted."""
         values, states = reading.values, list[WatchState]()
         for lookout, before in zip(self._lookouts, state.watches, strict=True):
-            if state.time is None and (time < before.time or time < before.averaged.last):
+            late = time + self.limits.reading_age
+            if state.time is None and (late < before.time or late < before.averaged.last):
                 # the clock was set back before a reading was used: no other clock is known yet
                 before = begin(lookout.watch)  # noqa: PLW2901
             seen, values = lookout.believe(before, time, values)

@@ -64,13 +64,17 @@ class Averaged(NamedTuple):
         return self.last - self.first >= choose(self.resting, t.at_rest, t.otherwise)
 
     def add(self, w: Work, size: Whole, value: Callable[[Whole], Number]) -> None:
-        """Record the statements that add a reading to the mean.
+        """Record the statements that add a reading to the mean, unless it is not later than the previous one.
 
         Parameters
         ----------
         value : callable
             Returns the value of an input by its index, below `size`.
         """
+        with when(self.readings.equals(0) | (w.now > self.last)):
+            self._add(w, size, value)
+
+    def _add(self, w: Work, size: Whole, value: Callable[[Whole], Number]) -> None:
         with when(self.readings.equals(0)):
             self.resting.set(w.stands)
             self.first.set(w.now)
