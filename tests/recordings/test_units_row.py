@@ -418,6 +418,12 @@ def test_a_fourth_part_that_can_only_be_a_fraction_is_read(last: str, tmp_path: 
     assert read(path).time.tolist() == [k / 2 for k in range(150)]
 
 
+@pytest.mark.parametrize("brackets", ["[]", "[1]", "[ ]"])
+def test_brackets_without_a_unit_are_no_unit(brackets: str, tmp_path: Path) -> None:
+    body = "".join(f"00:{k:02}:00,{20 + k},{k}\n" for k in range(30))
+    assert read(write(tmp_path, f"Time,{brackets} T1_C,Z_um\n{body}")).table.shape == (30, 2)
+
+
 def test_a_time_of_day_beside_a_date_keeps_its_name(tmp_path: Path) -> None:
     path = write(tmp_path, "Date,Time,T1,Z\n-,hh:mm,degC,um\n" + rows("%d/%m/%Y,%H:%M"))
     with pytest.raises(TwoReadingsError, match=r'\[time\] column = "Time", date = "Date" and format'):

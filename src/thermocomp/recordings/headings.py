@@ -122,8 +122,9 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
     """Return name and unit of a heading with brackets: ``T1 [degC]``, ``[degC] T1``, ``T1 [degC] (front)``."""
     found, earlier = BRACKETS.fullmatch(heading), _EARLIER.fullmatch(heading)
     symbol = (found["square"] or found["round"] or "").strip() if found else ""
-    if earlier and is_unit(earlier["unit"]) and not (symbol and is_unit(symbol)):
-        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(earlier["unit"])
+    before = earlier["unit"].strip() if earlier else ""
+    if earlier and before not in _NOT_IN_BRACKETS and is_unit(before) and not (symbol and is_unit(symbol)):
+        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(before)
     if found is None:
         return _behind(heading)
     base = found["base"]
