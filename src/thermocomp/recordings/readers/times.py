@@ -178,13 +178,12 @@ def _refuse_four_parts(text: "pd.Series[Any]", stated: str, file: FileCells) -> 
     even, passed_even = (len(step) > 1 and np.mean(np.abs(step - np.median(step)) < 1e-6) > _EVEN for step in steps)
     if even and not passed_even:
         return  # a fraction: only then are the rows equally spaced
-    first, keys = text.iloc[0].strip(), file.time_keys
+    first = text.iloc[0].strip()
     days = f'append it to the heading ("{file.heading} [d:hh:mm:ss]") if days come first; otherwise '
     raise TwoReadingsError(
         f"{file.at(0)}: the last part of {first!r} can be seconds after days, hours and minutes, or a fraction or "
         f"frames after the seconds; state how it is written: {'' if stated else days}write fractions after a point, "
-        f'or write a mapping: [time] {_told(keys)} and format = "%H:%M:%S:%f"',
-        [{"time": {**keys, "format": "%H:%M:%S:%f"}}] if file.times.date is None else [],
+        f'or write a mapping: [time] {_told(file.time_keys)} and format = "%H:%M:%S:%f" for decimals'
     )
 
 
