@@ -302,6 +302,128 @@ def test_a_stated_form_that_a_row_does_not_have_is_refused(said: str, cell: str,
         read(write(tmp_path, f"Time,T1,Z\n{said},degC,um\n{body}{cell},50,30\n"))
 
 
+def _write_clock(folder: Path, said: str, cells: Sequence[str], *, below: bool = False, date: str = "") -> Path:
+    """Write a file whose heading or row of units states a format; the date, if any, is in a column before it."""
+    first = "Date," * bool(date)
+    head = (
+        f"{first}Time,T1,Z\n{',' * bool(date)}{said},degC,um\n"
+        if below
+        else f"{first}Time{f' [{said}]' * bool(said)},T1_C,Z_um\n"
+    )
+    body = (f"{date}{',' * bool(date)}{cell},{20 + k / 80},{k / 4}\n" for k, cell in enumerate(cells))
+    return write(folder, head + "".join(body))
+
+
+def _parts(seconds: int) -> dict[str, int]:
+    return {"d": seconds // 86400, "h": seconds // 3600 % 24, "m": seconds // 60 % 60, "s": seconds % 60}
+
+
+@pytest.mark.parametrize(
+    ("said", "shown", "step"),
+    [
+        *(("d:hh:mm", "{d}:{h:02}:{m:02}", 1800), ("DDD:HH:MM", "{d:03}:{h:02}:{m:02}", 1800)),
+        *(("d:hh:mm:ss", "{d}:{h:02}:{m:02}:{s:02}", 1790), ("dd:hh:mm:ss", "{d:02}:{h:02}:{m:02}:{s:02}", 10)),
+        *(("mm:ss.f", "{m}:{s:02}.0", 7), ("mm:ss:fff", "{m:02}:{s:02}:000", 7), ("MM:SS.000", "{m}:{s:02}.000", 7)),
+        *(("min:sec", "{m}:{s:02}", 7), ("m:ss", "{m}:{s:02}", 7)),
+    ],
+)
+@pytest.mark.parametrize("below", [True, False])
+def test_elapsed_times_are_read_in_the_stated_format(
+    said: str, shown: str, step: int, below: bool, tmp_path: Path
+) -> None:
+    cells = [shown.format(**_parts(step * k)) for k in range(150)]
+    recording = read(_write_clock(tmp_path, said, cells, below=below))
+    assert recording.time.tolist() == [float(step * k) for k in range(150)]
+    assert "is read as" in " ".join(recording.notes)
+
+
+@pytest.mark.parametrize(("said", "days"), [("mm:ss:ms", ""), ("d hh:mm:ss", "0 01:"), ("d.hh:mm:ss", "0.01:")])
+def test_a_stated_fraction_is_kept(said: str, days: str, tmp_path: Path) -> None:
+    mark = "." if days else ":"
+    cells = [f"{days}{k // 120:02}:{k // 2 % 60:02}{mark}{k % 2 * 500:03}" for k in range(150)]
+    assert read(_write_clock(tmp_path, said, cells)).time.tolist() == [k / 2 for k in range(150)]
+
+
+@pytest.mark.parametrize("below", [True, False])
+def test_minutes_and_seconds_beside_a_date_are_elapsed_times(below: bool, tmp_path: Path) -> None:
+    cells = [f"{k // 12:02}:{5 * k % 60:02}" for k in range(150)]
+    path = _write_clock(tmp_path, "mm:ss", cells, below=below, date="16.03.2026")
+    assert read(path).time.tolist() == [5.0 * k for k in range(150)]
+    mapping = check_content({"time": {"column": "Time" if below else "Time [mm:ss]", "date": "Date"}}, "m")
+    with pytest.raises(InputError, match="cannot be read in the format"):
+        read(path, mapping)
+
+
+def test_minutes_and_seconds_that_pass_the_hour_beside_a_date_are_refused(tmp_path: Path) -> None:
+    cells = [f"{k // 3 % 60:02}:{20 * k % 60:02}" for k in range(200)]
+    with pytest.raises(InputError, match=r"time 00:00 is before 59:40"):
+        read(_write_clock(tmp_path, "mm:ss", cells, date="16.03.2026"))
+
+
+@pytest.mark.parametrize(
+    ("said", "cell"),
+    [
+        *(("mm:ss:ff", "{m:02}:{s:02}:00"), ("mm:ss:00", "{m:02}:{s:02}:50"), ("mm:ss", "0:{m:02}:{s:02}")),
+        *(("hh:mm:ff", "{h:02}:{m:02}:00"), ("h:ss", "0:{s:02}"), ("min:s:1/100", "{m:02}:{s:02}:00")),
+        *(("yyyy-mm-dd mm:ss", "2026-03-16 {m:02}:{s:02}"), ("d:hh:mm", "{d} {h:02}.{m:02}")),
+    ],
+)
+@pytest.mark.parametrize("below", [True, False])
+def test_other_stated_formats_are_refused(said: str, cell: str, below: bool, tmp_path: Path) -> None:
+    path = _write_clock(tmp_path, said, [cell.format(**_parts(20 * k)) for k in range(150)], below=below)
+    with pytest.raises(InputError, match=r"column 'Time \[.*' cannot be read in the format .*\[time\] column"):
+        read(path)
+    assert run(["map", str(path), "--yes", "-o", str(tmp_path / "map.toml")]) == 2
+
+
+def test_heading_and_row_of_units_that_state_different_clocks_are_refused(tmp_path: Path) -> None:
+    body = "".join(f"{k // 60:02}:{k % 60:02},{20 + k / 80},{k / 4}\n" for k in range(150))
+    with pytest.raises(InputError, match="cannot be read in the format"):
+        read(write(tmp_path, f"Time [hh:mm],T1,Z\nmm:ss,degC,um\n{body}"))
+    assert read(write(tmp_path, f"Time [s],T1,Z\nmm:ss,degC,um\n{body}")).time[-1] == 149
+
+
+def test_the_format_of_a_spreadsheet_cell_does_not_leave_out_its_hours(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    assert book.active is not None
+    for row in [("Time [mm:ss]", "T1_C", "Z_um"), *((time(0, k, 0), 20.0 + k, k / 4) for k in range(40))]:
+        book.active.append(row)
+    book.save(tmp_path / "logger.xlsx")
+    assert read(tmp_path / "logger.xlsx").time[-1] == 39 * 60
+
+
+@pytest.mark.parametrize(
+    ("cells", "said"),
+    [
+        ([f"0:{k // 60:02}:{k % 60:02}:00" for k in range(150)], ""),
+        ([f"00:00:{k // 6:02}:{10 * k % 60:02}" for k in range(150)], ""),
+        ([f"00:00:{k // 5:02}:{5 * k % 25:02}" for k in range(150)], "hh:mm:ss:ff"),
+    ],
+)
+def test_a_fourth_part_that_may_be_seconds_or_frames_is_asked_about(
+    cells: list[str], said: str, tmp_path: Path
+) -> None:
+    path = _write_clock(tmp_path, said, cells)
+    with pytest.raises(TwoReadingsError, match="seconds after days, hours and minutes, or a fraction or frames"):
+        read(path)
+    assert run(["map", str(path), "--yes", "-o", str(tmp_path / "map.toml")]) == 2
+
+
+@pytest.mark.parametrize("last", ["{:02}", "{:03}"])
+def test_a_fourth_part_that_can_only_be_a_fraction_is_read(last: str, tmp_path: Path) -> None:
+    half = 50 if last == "{:02}" else 500
+    cells = [f"08:{k // 120:02}:{k // 2 % 60:02}:{last.format(k % 2 * half)}" for k in range(150)]
+    assert read(_write_clock(tmp_path, "", cells)).time.tolist() == [k / 2 for k in range(150)]
+    path = _write_clock(tmp_path, "hh:mm:ss:ff", cells, date="16.03.2026")
+    assert read(path).time.tolist() == [k / 2 for k in range(150)]
+
+
+@pytest.mark.parametrize("brackets", ["[]", "[1]", "[ ]"])
+def test_brackets_without_a_unit_are_no_unit(brackets: str, tmp_path: Path) -> None:
+    body = "".join(f"00:{k:02}:00,{20 + k},{k}\n" for k in range(30))
+    assert read(write(tmp_path, f"Time,{brackets} T1_C,Z_um\n{body}")).table.shape == (30, 2)
+
+
 def test_a_time_of_day_beside_a_date_keeps_its_name(tmp_path: Path) -> None:
     path = write(tmp_path, "Date,Time,T1,Z\n-,hh:mm,degC,um\n" + rows("%d/%m/%Y,%H:%M"))
     with pytest.raises(TwoReadingsError, match=r'\[time\] column = "Time", date = "Date" and format'):

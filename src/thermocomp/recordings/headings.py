@@ -53,6 +53,16 @@ _DIFFERENCE = re.compile(
 _TIMES = frozenset(read_words("times"))
 #: letters of a date or time in a heading, such as hh:mm:ss and TT.MM.JJJJ
 _FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+")
+#: a date in the format of a timestamp, with the T before the hours
+_DAY_PART = "(?:d+|m+|y+|j+|a+|t+|g+)"
+_DATE = re.compile(rf"(?<![a-z:]){_DAY_PART}(?:[-./ ]+{_DAY_PART})+(?:t(?=h)|(?![a-z:]))")
+#: parts of the format of a clock: days, hours, minutes, seconds, and a fraction of a second
+_CLOCK_PARTS = {
+    **{"d": "d{1,3}|days?", "h": "h+(?:12|24)?|k+|hrs?|std", "m": "m+|n+|min?", "s": "ss?|se[ck]"},
+    "f": "f+|0+|s{3,}|ms",
+}
+#: formats of times of day, as `find_clock_form` returns them
+DAY_FORMS = ("hm", "hms", "hmsf")
 
 
 @dataclass(frozen=True)
@@ -112,8 +122,9 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
     """Return name and unit of a heading with brackets: ``T1 [degC]``, ``[degC] T1``, ``T1 [degC] (front)``."""
     found, earlier = BRACKETS.fullmatch(heading), _EARLIER.fullmatch(heading)
     symbol = (found["square"] or found["round"] or "").strip() if found else ""
-    if earlier and is_unit(earlier["unit"]) and not (symbol and is_unit(symbol)):
-        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(earlier["unit"])
+    before = earlier["unit"].strip() if earlier else ""
+    if earlier and before not in _NOT_IN_BRACKETS and is_unit(before) and not (symbol and is_unit(symbol)):
+        return f"{earlier['before']} {earlier['after']}".strip(), find_unit(before)
     if found is None:
         return _behind(heading)
     base = found["base"]
@@ -132,7 +143,7 @@ def _in_brackets(heading: str) -> tuple[str, Unit] | None:
 @lru_cache(maxsize=1024)
 def _is_mistyped(symbol: str) -> bool:
     """Return whether a unit is a typing error, such as [degX]; [kW], [%] or (front) mark columns that are not used."""
-    return not (is_foreign_unit(symbol) or _FORMAT.fullmatch(symbol)) and bool(
+    return not (is_foreign_unit(symbol) or _is_format(symbol)) and bool(
         get_close_matches(symbol.casefold(), SPELLINGS, n=1, cutoff=0.85)
         or get_close_matches(symbol, SUFFIXES, n=1, cutoff=0.6)
     )
@@ -176,8 +187,12 @@ def strip_format(heading: str) -> str:
     """Return a heading without the date format in brackets at its end."""
     name = strip_heading(heading)
     found = BRACKETS.fullmatch(name)
-    is_format = found and _FORMAT.fullmatch((found["square"] or found["round"] or "").strip())
+    is_format = found and _is_format((found["square"] or found["round"] or "").strip())
     return found["base"] if found and is_format else name
+
+
+def _is_format(text: str) -> bool:
+    return _FORMAT.fullmatch(text) is not None or (":" in text and bool(find_clock_form(text)))
 
 
 def find_date_orders(heading: str) -> tuple[str, ...]:
@@ -188,10 +203,34 @@ def find_date_orders(heading: str) -> tuple[str, ...]:
 
 
 def find_clock_form(heading: str) -> str:
-    """Return the format of times of two parts in the brackets of a heading: ``hh:mm`` or ``mm:ss``; else empty."""
-    found = BRACKETS.fullmatch(strip_heading(heading))
-    form = ((found["square"] or found["round"] or "") if found else heading).strip().casefold()
-    return "%H:%M" if re.fullmatch("h+:m+", form) else "%M:%S" if re.fullmatch("m+:s+", form) else ""
+    """Return the format of a clock in a heading by one letter for each part; empty if it specifies none.
+
+    ``d``, ``h``, ``m``, ``s`` are days to seconds, ``f`` is a fraction of a second: ``Time [mm:ss.fff]`` gives
+    ``msf``, ``yyyy-mm-dd hh:mm`` gives ``hm``. A part of another kind is a question mark; so is the whole if the
+    heading and the row of units specify different formats.
+    """
+    plain = re.sub(r"[\[(]?([hms]+)\](?=:)", r"\1", re.sub("['%]", "", heading.casefold()))  # [h]:mm as in Excel
+    texts = [*re.findall(r"[\[(]([^\[\]()]*)[\])]", plain), re.sub(r"[\[(][^\[\]()]*[\])]", " ", plain)]
+    forms = {_find_parts(text) for text in texts} - {""}
+    return next(iter(forms)) if len(forms) == 1 else "?" * bool(forms)
+
+
+def _find_parts(text: str) -> str:
+    """Return the parts of the format of a clock, in the letters of `find_clock_form`."""
+    words = [re.sub(r"[+±-].*|z+$", "", word) for word in re.split(r"[\s;_]+", _DATE.sub(" ", text))]
+    found = [_read_parts(word) for word in words if word]
+    if any("?" in parts for parts in found):  # then words of other kinds are around it, such as am/pm
+        found = [_read_parts(word) for word in words if ":" in word]
+    found = [parts for parts in found if len(parts.replace("?", "")) > 1 or parts in "dhmsf"]
+    return "" if len(parts := "".join(found)) < 2 or not parts.strip("f") else parts
+
+
+def _read_parts(word: str) -> str:
+    parts = ""
+    for part in filter(None, re.split("[:.,]", word)):
+        kind = next((kind for kind, forms in _CLOCK_PARTS.items() if re.fullmatch(forms, part)), "?")
+        parts += "f" if parts.endswith("s") and re.fullmatch(r"(.)\1*", part) else kind  # .mmm, .xxx
+    return parts
 
 
 def find_date_order(heading: str) -> str:

@@ -11,6 +11,7 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import find_unit, is_unit
 from thermocomp.recordings.headings import (
     BRACKETS,
+    DAY_FORMS,
     find_clock_form,
     find_date_order,
     find_date_orders,
@@ -158,8 +159,8 @@ def join_units(
     """Add the units of row `number` of a file to the headings above them that have none.
 
     The contents of a column decide: dates, times of day and words have no unit, whatever the row contains (``Unit``,
-    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept, and the form of a time that may be hours and
-    minutes or minutes and seconds. The first column may contain a label of the row.
+    ``hh:mm:ss``), but the order of a date (``mm/dd/yyyy``) is kept, and the form of a time that is not a time of day
+    (``mm:ss``) or may be hours and minutes or minutes and seconds. The first column may contain a label of the row.
     """
     said = [_bare(unit) for unit in units]
     cells = [next((row[k] for row in rows if k < len(row) and not is_filler(row[k])), "") for k in range(len(headings))]
@@ -168,10 +169,11 @@ def join_units(
     for k, (heading, cell) in enumerate(zip(headings, cells, strict=True)):
         unit = said[k] if k < len(said) else ""
         known = is_unit(unit) or is_foreign_unit(unit)
+        form = find_clock_form(unit) if is_stamp(cell) else ""
         if is_stamp(cell) and _CLOCK.fullmatch(cell.strip()) and not dated:
-            fits = bool(find_clock_form(unit))
+            fits = bool(form)
         elif is_stamp(cell):
-            fits = bool(find_date_order(unit))
+            fits = bool(find_date_order(unit)) or form not in ("", *DAY_FORMS)
         elif k == 0 or is_time_name(heading) or (cell and not is_number_like(cell)):
             fits = known
         else:
@@ -182,14 +184,18 @@ def join_units(
                 f"{where}, column {k + 1}: the heading {heading!r} specifies {own}, row {number} below it {unit!r}: "
                 f"correct the wrong one; if it is row {number}, give a mapping with [read] skip = [{number}]"
             )
-        added = not BRACKETS.fullmatch(heading) or (is_stamp(cell) and _states_other_order(heading, unit))
-        found.append(f"{heading} [{unit}]" if fits and heading and added else heading)
+        other = fits and is_stamp(cell) and _states_other(heading, unit)
+        added = fits and heading and (other or not BRACKETS.fullmatch(heading))
+        found.append(f"{heading} [{unit}]" if added else heading)
     return found
 
 
-def _states_other_order(heading: str, unit: str) -> bool:
-    """Return whether heading and row of units specify different orders of day and month, of which rows decide."""
-    return len(find_date_orders(f"{heading} [{unit}]")) > 1
+def _states_other(heading: str, unit: str) -> bool:
+    """Return whether a row of units specifies an order of day and month or a clock that the heading does not."""
+    return len(find_date_orders(f"{heading} [{unit}]")) > 1 or find_clock_form(unit) not in (
+        "",
+        find_clock_form(heading),
+    )
 
 
 def _contradicted(heading: str, symbol: str) -> str:
@@ -261,7 +267,7 @@ def _is_units(row: Sequence[str], numbers: Sequence[int]) -> bool:
 
 
 def _bare(unit: str) -> str:
-    return unit.strip().strip("[]()").strip()
+    return unit.strip().strip("[]()").strip().replace("]:", ":")  # [mm]:ss, as a spreadsheet writes it
 
 
 def _holds_numbers(rows: Sequence[Sequence[str]], column: int) -> bool:

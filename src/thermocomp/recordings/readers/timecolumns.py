@@ -5,7 +5,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError, tell_nearest
-from thermocomp.recordings.headings import BRACKETS, Meaning, is_time_name, plain_name, strip_format
+from thermocomp.recordings.headings import (
+    BRACKETS,
+    Meaning,
+    find_clock_form,
+    is_time_name,
+    plain_name,
+    strip_format,
+)
 from thermocomp.recordings.readers.cellkinds import Kinds
 from thermocomp.recordings.readers.dayforms import names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
@@ -100,8 +107,8 @@ def find_parts(headings: Sequence[str]) -> list[str]:
 
 
 def has_passed(heading: str) -> bool:
-    """Return whether a heading denotes an elapsed time, not a time of day."""
-    return _PASSED.search(heading.casefold()) is not None
+    """Return whether a heading denotes an elapsed time, not a time of day, by its name or a format without hours."""
+    return _PASSED.search(heading.casefold()) is not None or find_clock_form(heading).startswith(("d", "m", "s"))
 
 
 def _by_name(
@@ -118,7 +125,7 @@ def _by_name(
     clock = next((plain[name] for name in _CLOCKS if name in plain), None)
     if date is not None and clock is not None:
         whole = next((k for k in (clock, date) if kinds(k) == "stamp"), None)
-        alone = clock if kinds(clock) == "passed" else whole
+        alone = clock if kinds(clock) == "passed" or has_passed(headings[clock]) else whole
         return (clock, date, []) if alone is None else (alone, None, [])
     names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
     bare = [plain[name] for name in names if name not in _NEEDS_UNIT or kinds(plain[name]) in ("date", "stamp")]

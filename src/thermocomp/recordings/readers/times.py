@@ -9,12 +9,12 @@ import pandas as pd
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
 from thermocomp.core.units import find_unit
-from thermocomp.recordings.headings import find_clock_form
+from thermocomp.recordings.headings import DAY_FORMS, find_clock_form
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
 from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, SERIAL
 from thermocomp.recordings.readers.filecells import FileCells
 from thermocomp.recordings.readers.stamps import AmbiguousDatesError, Parsed, has_day, parse, parse_stamps
-from thermocomp.recordings.readers.tables import tell_places
+from thermocomp.recordings.readers.tables import FrameTable, tell_places
 from thermocomp.recordings.readers.timefaults import refuse_falling, refuse_passed, refuse_set_forward
 from thermocomp.recordings.readers.timehints import find_formats
 
@@ -22,6 +22,21 @@ from thermocomp.recordings.readers.timehints import find_formats
 _SERIAL_BEGIN = -25569 * 86400
 _DATE_WORDS = ("date", "datum", "dat", "stamp", "stempel", "fecha")
 _DAY = 86_400_000_000_000  # [ns]
+#: elapsed times by the format that the heading states; after a colon, a fraction with other than three digits may count
+#: frames
+_PASSED = {
+    "ms": r"(?P<minutes>\d+):(?P<seconds>[0-5]\d(?:[.,]\d+)?)",
+    "msf": r"(?P<minutes>\d+):(?P<seconds>[0-5]\d(?:[.,]\d+|:\d{3})?)",
+    "dhm": r"(?P<days>\d+)[:. ](?P<hours>[01]?\d|2[0-3]):(?P<minutes>[0-5]\d)",
+    "dhms": r"(?P<days>\d+)(?:[:. ]| days?,? )(?P<hours>[01]?\d|2[0-3]):(?P<minutes>[0-5]\d):"
+    r"(?P<seconds>[0-5]\d(?:[.,]\d+)?)",
+}
+#: these formats as they are told
+_WRITTEN = {"ms": "%M:%S", "msf": "%M:%S.%f", "dhm": "d:hh:mm", "dhms": "d:hh:mm:ss"}
+#: minimum fraction of equal steps of times that are equally spaced
+_EVEN = 0.9
+#: four parts that may be days to seconds, or a fraction or frames after the seconds
+_FOUR_PARTS = r"(?:.* )?(\d+):(\d\d):(\d\d):([0-5]?\d)"
 
 
 def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple[str, ...]]:
@@ -83,6 +98,12 @@ def _read_stamps(cells: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, 
         return _seconds(cells - cells.iloc[0]), cells.iloc[0].isoformat(), ()
     text = cells.astype(str)
     first = text.iloc[0].strip()
+    if not wanted and (stated := find_clock_form(file.heading)) not in ("", *DAY_FORMS):
+        spreadsheet = isinstance(file.table, FrameTable) and first.count(":") == 2  # its times have all their parts
+        if not (spreadsheet and stated == "ms"):
+            return _read_stated(text, "?" if spreadsheet else stated, file)
+    elif not wanted and re.fullmatch(_FOUR_PARTS, first) and (stated == "hmsf" or re.match(r"\d+:", first)):
+        _refuse_four_parts(text, stated, file)
     if not wanted and file.times.date is None and (CLOCK.fullmatch(first) or HALF.fullmatch(first)):
         return _read_clock(text, file)
     if wanted:
@@ -145,13 +166,54 @@ def _told(keys: dict[str, str]) -> str:
     return ", ".join(f'{key} = "{title}"' for key, title in keys.items())
 
 
+def _refuse_four_parts(text: "pd.Series[Any]", stated: str, file: FileCells) -> None:
+    """Raise an error if times of four parts may be days to seconds, or the heading states a part that may be frames."""
+    parts = text.str.strip().str.extract(f"^{_FOUR_PARTS}$")
+    if parts.isna().to_numpy().any():
+        return  # a fraction of 60 or more, or with three digits
+    a, b, c, d = (pd.to_numeric(parts[k]).to_numpy(dtype=np.float64) for k in parts)
+    fraction = pd.to_numeric("0." + parts[3]).to_numpy(dtype=np.float64)
+    read = ((a * 60 + b) * 60 + c + fraction, ((a * 24 + b) * 60 + c) * 60 + d)
+    steps = [np.diff(seconds) for seconds in read]
+    even, passed_even = (len(step) > 1 and np.mean(np.abs(step - np.median(step)) < 1e-6) > _EVEN for step in steps)
+    if even and not passed_even:
+        return  # a fraction: only then are the rows equally spaced
+    first = text.iloc[0].strip()
+    days = f'append it to the heading ("{file.heading} [d:hh:mm:ss]") if days come first; otherwise '
+    raise TwoReadingsError(
+        f"{file.at(0)}: the last part of {first!r} can be seconds after days, hours and minutes, or a fraction or "
+        f"frames after the seconds; state how it is written: {'' if stated else days}write fractions after a point, "
+        f'or write a mapping: [time] {_told(file.time_keys)} and format = "%H:%M:%S:%f" for decimals'
+    )
+
+
+def _read_stated(text: "pd.Series[Any]", form: str, file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
+    """Read elapsed times in the format that the heading states."""
+    cells, first = text.str.strip(), text.iloc[0].strip()
+    if form not in _PASSED or not re.fullmatch(_PASSED[form], first):
+        raise RecordingError(
+            f"{file.at(0)}: {first!r} cannot be read in the format that the heading or the row of units states; state "
+            "mm:ss, mm:ss.fff, d:hh:mm, d:hh:mm:ss or a time of day (hh:mm:ss), in which fractions of a second follow "
+            f"a point or have three digits, or write a mapping: [time] {_told(file.time_keys)} and format, in the "
+            'letters of strptime, such as "%H:%M:%S", or "%M:%S:%f" for decimals after a colon'
+        )
+    parts = cells.str.extract(f"^{_PASSED[form]}$")
+    scales = {"days": 86400, "hours": 3600, "minutes": 60, "seconds": 1}
+    plain = parts.apply(lambda part: pd.to_numeric(part.str.replace(r"[,:]", ".", regex=True)))
+    seconds = sum((plain[name].to_numpy(dtype=np.float64) * scales[name] for name in plain), np.zeros(len(cells)))
+    _refuse_unlike(~np.isfinite(seconds), text, f"a time like {first!r}", file)
+    whole = np.rint(seconds * 1e9).astype(np.int64)
+    note = f"{file.heading!r} is read as {_WRITTEN[form]}, as the heading specifies"
+    return (whole - whole[0]) / 1e9, "", (note,)
+
+
 def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, str, tuple[str, ...]]:
     """Read times of day or elapsed times, neither of which contains a date."""
     first = text.iloc[0].strip()
     halves = HALF.fullmatch(first) is not None
     parts = text.str.strip().str.extract(CLOCK)
     short = not halves and pd.isna(parts["seconds"].iloc[0])
-    form = find_clock_form(file.heading) if short else ""
+    form = "%H:%M" if short and find_clock_form(file.heading) == "hm" else ""
     if short and not form:
         raise TwoReadingsError(
             f"{file.at(0)}: {first!r} can be read as hours and minutes or as minutes and seconds; state how it is "
@@ -168,8 +230,6 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
             odd = parts["seconds"].notna() | (pd.to_numeric(parts["minutes"]) > 59)
             _refuse_unlike(odd.to_numpy(), text, f"a time like {first!r}", file)
             parts["seconds"] = "0"
-        if form == "%M:%S":
-            parts["hours"], parts["minutes"], parts["seconds"] = "0", parts["hours"], parts["minutes"]
         texts = parts["seconds"].str.replace(r"[,:]", ".", regex=True)
         days, hours, minutes, rest = (
             pd.to_numeric(c, errors="coerce").to_numpy(dtype=np.float64)
