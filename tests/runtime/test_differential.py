@@ -79,10 +79,9 @@ def check(seed: int, way: type, *args: object, count: int, first: int | None = N
 def find_apart(tables: Tables, stream: Stream, one: Said, other: Said, within: float) -> NDArray[np.intp]:
     """Return the calls after which two ways have decided differently, or have other numbers."""
     clocks = [m.interval for m in tables.models if isinstance(m, Ticking)]
-    # a value that ticks is as exact as the time: by so much it changes in the last digit of the clock
-    steep = 100.0 * np.spacing(np.nansum(stream.dt, where=np.isfinite(stream.dt))) / min(clocks, default=np.inf)
-    # and beside a tick by so much, as it may be made so early
-    steep += 2.0 * EARLY * np.abs(one.numbers).max(initial=0.0) * bool(clocks)
+    # a value that ticks is as exact as the time, and as a tick that may be made early: it changes by its size in a tick
+    total = np.nansum(stream.dt, where=np.isfinite(stream.dt))
+    steep = (20.0 * np.spacing(total) / min(clocks) + 2.0 * EARLY) * np.abs(one.numbers).max() if clocks else 0.0
     allowed = np.maximum(FLOOR + steep, within * np.abs(one.numbers))
     same = (np.abs(one.numbers - other.numbers) <= allowed).all(axis=1)
     decisions = one.decisions == other.decisions
