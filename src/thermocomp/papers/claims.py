@@ -29,7 +29,7 @@ from typing import Any, Generic, TypeVar
 from thermocomp.papers.sentences import TextFile
 from thermocomp.papers.study import Claim
 
-#: named values that the sentences of a claim need beside the attributes of the results
+# named values that the sentences of a claim need beside the attributes of the results
 Facts = dict[str, Any]
 #: type of the results by which claims are judged
 _Found = TypeVar("_Found")

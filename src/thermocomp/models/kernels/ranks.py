@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from thermocomp.core.arrays import FloatArray
 
 RankArray = NDArray[np.uint32]
-#: half width of the boxcar, whether `triangle` replaces it, and `order`, `bounds` and `groups` of all variables
+# half width of the boxcar, whether `triangle` replaces it, and `order`, `bounds` and `groups` of all variables
 Smoothing = tuple[int, bool, RankArray, RankArray, NDArray[np.int64]]
 
 compiled: Any = njit(cache=True, nogil=True)

@@ -9,7 +9,7 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.profile import PolynomialProfile, SplineProfile
 
-#: polynomial: degree in the own coordinate and in the others; spline: number of inner knots and 0
+# polynomial: degree in the own coordinate and in the others; spline: number of inner knots and 0
 Order = tuple[int, int]
 
 #: limits of the orders, beyond which profiles cannot be distinguished from noise
