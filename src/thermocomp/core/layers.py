@@ -6,98 +6,20 @@ others are computed by one operation on an array, a layer.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermocomp.core import expression as e
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.forms import Form, Forms, add_forms
+from thermocomp.core.operations import IntArray, Lags, Layer, Ticks
 from thermocomp.core.recurrences import Clock
 from thermocomp.core.ticker import Ticker
 
-IntArray = NDArray[np.intp]
-
 #: number of values computed at once: they fit into the cache of a processor
 BLOCK = 2**17
-
-
-class _Layer(NamedTuple):
-    """Values in adjacent slots, computed by one operation on the values of each operand."""
-
-    slots: slice
-    operands: tuple[Forms, ...]
-    work: Callable[..., FloatArray]
-
-    def advance(self, values: FloatArray, _memory: FloatArray, _dt: float) -> None:
-        """Compute the values."""
-        values[..., self.slots] = self.work(*(f.evaluate(values) for f in self.operands))
-
-    def follow(self, values: FloatArray, memory: FloatArray, _steps: FloatArray) -> None:
-        """Compute the values of several readings, (n_readings, ..., n_slots)."""
-        self.advance(values, memory, 0.0)
-
-
-class _Lags(NamedTuple):
-    """First-order lags, in adjacent slots; rate = rest + pace * gain."""
-
-    slots: slice
-    memory: slice | IntArray
-    signals: Forms
-    rest: FloatArray  #: [1/s]
-    gain: FloatArray  #: [1/s]
-    paces: Forms | None
-
-    def advance(self, values: FloatArray, memory: FloatArray, dt: float) -> None:
-        """Move the lags towards their signals in the time `dt`; infinite: to the steady state."""
-        signals = self.signals.evaluate(values)
-        if dt == np.inf:
-            memory[..., self.memory] = signals
-        else:
-            held = memory[..., self.memory]
-            signals -= held
-            signals *= np.expm1(-dt * self._rates(values))
-            memory[..., self.memory] = held - signals
-        values[..., self.slots] = memory[..., self.memory]
-
-    def follow(self, values: FloatArray, memory: FloatArray, steps: FloatArray) -> None:
-        """Move the lags through several readings, (n_readings, ..., n_slots)."""
-        signals = self.signals.evaluate(values)
-        shares = np.expm1(-steps.reshape(-1, *[1] * (values.ndim - 1)) * self._rates(values))
-        held, found = memory[..., self.memory], values[..., self.slots]
-        for k, (signal, share) in enumerate(zip(signals, shares, strict=True)):
-            held = found[k] = held - (signal - held) * share
-        memory[..., self.memory] = held
-
-    def _rates(self, values: FloatArray) -> FloatArray:
-        return self.rest if self.paces is None else self.rest + self.paces.evaluate(values) * self.gain
-
-
-class _Ticks(NamedTuple):
-    """A value that is updated at fixed intervals (ticks)."""
-
-    slots: slice
-    memory: slice
-    inputs: Forms
-    ticker: Ticker
-
-    def advance(self, values: FloatArray, memory: FloatArray, dt: float) -> None:
-        """Make the ticks that are due; an infinite time: begin."""
-        inputs = self.inputs.evaluate(values)
-        if dt == np.inf:
-            memory[..., self.memory] = self.ticker.begin(inputs)
-            values[..., self.slots.start] = 0.0
-        else:
-            own, values[..., self.slots.start] = self.ticker.advance(memory[..., self.memory], inputs, dt)
-            memory[..., self.memory] = own
-
-    def follow(self, values: FloatArray, memory: FloatArray, steps: FloatArray) -> None:
-        """Make the ticks of several readings, (n_readings, ..., n_slots)."""
-        for reading, dt in zip(values, steps.tolist(), strict=True):
-            self.advance(reading, memory, dt)
 
 
 @dataclass(frozen=True)
@@ -168,7 +90,7 @@ class Layers:
         """Return the memory of a machine at steady state for `change`, with known values of its recurrences, (...)."""
         memory = self.begin(change)
         for layer in self._layers:
-            if isinstance(layer, _Ticks):
+            if isinstance(layer, Ticks):
                 values = self._run(memory.copy(), change, np.inf)
                 memory[..., layer.memory] = layer.ticker.begin_at(value, layer.inputs.evaluate(values))
         return memory
@@ -303,7 +225,7 @@ class _Builder:
         """True if the values include curves, which may have steps."""
         return any(s.curve is not None for s in self._slots)
 
-    def lay(self) -> tuple[list[int], list[_Layer | _Lags | _Ticks], int]:
+    def lay(self) -> tuple[list[int], list[Layer | Lags | Ticks], int]:
         """Return the position of each slot, the layers in the order of computation, and the number of lags."""
         groups: dict[tuple[object, ...], list[_Slot]] = {}
         for slot in sorted(self._slots, key=lambda s: s.level):
@@ -326,7 +248,7 @@ class _Builder:
         self.remembered = tuple(s.node for s in kept if s.node is not None)
         ends = np.cumsum([0, *(tickers[s].n_memory if s in tickers else 1 for s in kept)])
         begin_of = dict(zip(kept, ends.tolist(), strict=False))
-        layers = list[_Layer | _Lags | _Ticks]()
+        layers = list[Layer | Lags | Ticks]()
         for members in groups.values():
             first = places[self._slots[members[0]]]
             own = slice(first, first + len(members))
@@ -334,7 +256,7 @@ class _Builder:
                 (slot,) = members
                 inputs = Forms([f.moved(places) for f in slot.operands], self.exact)
                 memory = slice(begin_of[slot], begin_of[slot] + ticker.n_memory)
-                layers.append(_Ticks(own, memory, inputs, ticker))
+                layers.append(Ticks(own, memory, inputs, ticker))
                 continue
             operands = tuple(
                 Forms([f.moved(places) for f in column], self.exact)
@@ -345,9 +267,9 @@ class _Builder:
                 rest, gain = numbers
                 paces = operands[1] if kind == "paced" else None
                 where = _places([begin_of[s] for s in members])
-                layers.append(_Lags(slots=own, memory=where, signals=operands[0], rest=rest, gain=gain, paces=paces))
+                layers.append(Lags(slots=own, memory=where, signals=operands[0], rest=rest, gain=gain, paces=paces))
             else:
-                layers.append(_Layer(own, operands, _work_of(members[0], numbers)))
+                layers.append(Layer(own, operands, _work_of(members[0], numbers)))
         return places, layers, int(ends[-1])
 
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.band import Band
 from thermocomp.core.bounds import GAP, INPUTS, READING, check_count, check_name
-from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError, ReadingError, SettingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
@@ -27,7 +26,7 @@ from thermocomp.core.inputs import Input, Support, TrainedRange
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.layers import Layers
 from thermocomp.core.provenance import HonestError, Provenance, read_approval
-from thermocomp.core.rows import run_table
+from thermocomp.core.rows import Replayable
 from thermocomp.core.state import RunOutputs, State
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
@@ -37,7 +36,7 @@ _UNIT = re.compile(r"(um|urad)(/m(\^[2-9])?)?")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ErrorModel(Gated, ModelFamily):
+class ErrorModel(Gated, Replayable, ModelFamily):
     """Frozen model of one error component.
 
     Parameters
@@ -311,54 +310,6 @@ class ErrorModel(Gated, ModelFamily):
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return a reading relative to its reference, clipped to the training range."""
         return self.clip(_bounded(inputs) - state.reference)[0]
-
-    def predict(
-        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
-    ) -> FloatArray:
-        """Replay the model through a table, row by row, as it would run at the machine without gate and limits.
-
-        Parameters
-        ----------
-        table : mapping of str to array-like of shape (n_rows,)
-            A DataFrame, or any object that returns a column by name; columns with the names and units of `inputs`. A
-            row with a missing value (NaN) is skipped: the previous deviation is held, 0 at the start.
-        time : str or array-like of shape (n_rows,), optional
-            Time: numbers [s], or datetimes with or without a time zone; or the name of its column. Default: the column
-            ``time_s``. A row that is not later than the previous one starts a new test, from rest and with a separate
-            zero (reference reading): the mean over its start, see `Zeroing`; its spindle column, if present, shows
-            whether the spindle is stopped. A model without memory needs no time; then the first row is the zero.
-        reference : array-like of shape (n_inputs,), optional
-            Reference of the inputs, as in `init`.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-            Deviation [unit].
-
-        Raises
-        ------
-        InputError
-            A column is missing or contains a non-numeric value; or a model with memory has no time.
-        """
-        return run_table(self, table, time, reference=reference).spread(lambda run: run.deviation, 0.0)
-
-    def half_widths(
-        self, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
-    ) -> FloatArray:
-        """Return the half-widths of the band about the result of `predict` for the same table.
-
-        Parameters
-        ----------
-        table, time, reference
-            As for `predict`.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
-            [unit]; NaN without a band, and before the first complete row of a test.
-        """
-        found = run_table(self, table, time, reference=reference)
-        return found.spread(lambda run: self.widen(run.change, run.outputs, run.deviation), np.nan)
 
     # -- derived numbers ----------------------------------------------------------------------------------------------
 

@@ -41,9 +41,12 @@ class Runnable(Protocol):
     def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> RunOutputs:
         """Process readings one after another."""
 
+    def widen(self, change: FloatArray, outputs: FloatArray, deviation: FloatArray) -> FloatArray:
+        """Return the half-widths of the band for the outputs of `run`."""
+
 
 class TableRun(NamedTuple):
-    """Runnable of a model through the tests of a table."""
+    """Outputs of a model for the tests of a table."""
 
     runs: list[RunOutputs]
     places: NDArray[np.intp]  #: (n_rows,), last complete reading of the test, over all runs; -1: none yet
@@ -95,3 +98,55 @@ def run_table(
         places[own] = np.maximum.accumulate(places[own])
         done += len(rows)
     return TableRun(runs, places)
+
+
+class Replayable:
+    """A model that is replayed through a table."""
+
+    def predict(
+        self: Runnable, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    ) -> FloatArray:
+        """Replay the model through a table, row by row, as it would run at the machine without gate and limits.
+
+        Parameters
+        ----------
+        table : mapping of str to array-like of shape (n_rows,)
+            A DataFrame, or any object that returns a column by name; columns with the names and units of `inputs`. A
+            row with a missing value (NaN) is skipped: the previous deviation is held, 0 at the start.
+        time : str or array-like of shape (n_rows,), optional
+            Time: numbers [s], or datetimes with or without a time zone; or the name of its column. Default: the column
+            ``time_s``. A row that is not later than the previous one starts a new test, from rest and with a separate
+            zero (reference reading): the mean over its start, see `Zeroing`; its spindle column, if present, shows
+            whether the spindle is stopped. A model without memory needs no time; then the first row is the zero.
+        reference : array-like of shape (n_inputs,), optional
+            Reference of the inputs, as in `init`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+            Deviation [unit].
+
+        Raises
+        ------
+        InputError
+            A column is missing or contains a non-numeric value; or a model with memory has no time.
+        """
+        return run_table(self, table, time, reference=reference).spread(lambda run: run.deviation, 0.0)
+
+    def half_widths(
+        self: Runnable, table: Columns, time: ArrayLike | str | None = None, *, reference: ArrayLike | None = None
+    ) -> FloatArray:
+        """Return the half-widths of the band about the result of `predict` for the same table.
+
+        Parameters
+        ----------
+        table, time, reference
+            As for `predict`.
+
+        Returns
+        -------
+        ndarray of shape (n_rows,)
+            [unit]; NaN without a band, and before the first complete row of a test.
+        """
+        found = run_table(self, table, time, reference=reference)
+        return found.spread(lambda run: self.widen(run.change, run.outputs, run.deviation), np.nan)

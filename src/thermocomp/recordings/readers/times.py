@@ -31,7 +31,7 @@ _PASSED = {
     "dhms": r"(?P<days>\d+)(?:[:. ]| days?,? )(?P<hours>[01]?\d|2[0-3]):(?P<minutes>[0-5]\d):"
     r"(?P<seconds>[0-5]\d(?:[.,]\d+)?)",
 }
-#: these formats as they are told
+#: these formats as messages name them
 _WRITTEN = {"ms": "%M:%S", "msf": "%M:%S.%f", "dhm": "d:hh:mm", "dhms": "d:hh:mm:ss"}
 #: minimum fraction of equal steps of times that are equally spaced
 _EVEN = 0.9
