@@ -89,7 +89,9 @@ def find_apart(tables: Tables, stream: Stream, one: Said, other: Said, within: f
     if several:  # which of several reasons for a rejection comes first
         decisions[:, -2] |= np.minimum(one.decisions[:, -2], other.decisions[:, -2]) >= 2
     if len({m.support.margin for m in tables.models}) > 1:  # until a zero is known, models of fewer margins run
-        decisions[:, -1] |= (one.decisions[:, : len(tables.targets)] == 0).any(axis=1)
+        waiting = (one.decisions[:, : len(tables.targets)] == 0).any(axis=1)
+        used = np.where(one.decisions[:, -2] == 0, np.arange(len(waiting)), 0)
+        decisions[:, -1] |= waiting[np.maximum.accumulate(used)]  # also after a reading that is rejected
     return np.flatnonzero(~(same & decisions.all(axis=1)))
 
 
