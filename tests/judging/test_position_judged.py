@@ -171,7 +171,7 @@ def test_settings_left_open_are_chosen_in_each_split_from_what_is_learned_there(
     k1 = change @ list(blind.model.slopes[0].coefficients_by_name().values())
     left = [v - blind.model.at(made.points, np.array([k])) for v, k in zip(made.values[last], k1, strict=True)]
     assert found.assessment.cycles[2].model == pytest.approx(np.sqrt(np.mean(np.square(left))))
-    # its factors are told in the powers of the whole, though it was predicted by one alone: the other was zero
+    # factors are in the powers of the whole, though one alone predicted it: the other was zero
     honest = found.fit.model.slopes[1].honest_error
     assert honest is not None
     k2 = found.fit.slopes[0].factors[last, 1]

@@ -53,16 +53,16 @@ fade; `thermocomp export --to c99` writes all of this in C.
 |---|---|---|---|---|
 {inputs}
 
-| input | what it is |
+| input | meaning |
 |---|---|
 | `value` | readings, in the order above |
-| `zero` | what each of them counts from; not used where the table has a number |
+| `zero` | zero (reference value) of each reading; not used where the table has a number |
 | `dt` | time since the previous accepted call [s]; only if the model has a memory |
 | `state` | `next_state` of that call, zeros at the start; only if the model has a memory, or holds |
 
 `deviation` is actual minus commanded; the correction is its negative. `outside` marks the inputs outside the trained
-range. If a value is not finite, or `dt` is negative, `deviation` is NaN and the state does not change. The state is 1
-after the first reading, the last deviation, and the memory. A model with a fixed interval makes at most 100,000 ticks
+range. If a value is not finite, or `dt` is negative, `deviation` is NaN and the state does not change. The state
+consists of a flag (1 after the first reading), the last deviation, and the memory. A model with a fixed interval makes at most 100,000 ticks
 in a call (17 days at 15 s).{axes}
 """
 
