@@ -74,10 +74,9 @@ def run(
     complete = np.asarray(np.isfinite(values).all(axis=1))
     gate = _gated(model, time, values, stands, model.init(reference).reference)
     zero, rested = find_test_zero(model, time, values, stands, complete, reference)
-    shown = _Shown(band=model.band is not None, directions=probed is not None)
-    alone = _said(model, time, rested, complete, zero, shown)
+    alone = _said(model, time, rested, complete, zero)
     same = np.array_equal(gate.passed, complete)
-    gated = alone if same else _said(model, time, *_of_gate(values, gate), shown._replace(band=False))
+    gated = alone if same else _said(model, time, *_of_gate(values, gate))
     known = gate.known
     if anew is not None:
         counted, _ = _counted(alone.deviation, model, time, complete, stands, anew)
@@ -138,16 +137,11 @@ def find_test_zero(
     return find_zero(model.zeroing, model.init(reference).reference, time, values, resting, usable)
 
 
-class _Shown(NamedTuple):
-    band: bool
-    directions: bool
-
-
 class _Answers(NamedTuple):
     deviation: FloatArray  #: (n_rows,)
     outside: BoolArray  #: (n_rows,), whether an input was outside
-    half_width: FloatArray  #: (n_rows,), of the uncertainty band; nan if not requested
-    directions: FloatArray  #: (n_rows, n_directions); n_directions = 0 if not requested
+    half_width: FloatArray  #: (n_rows,), of the uncertainty band; nan without one
+    directions: FloatArray  #: (n_rows, n_directions)
 
 
 class _Gate(NamedTuple):
@@ -208,17 +202,13 @@ def _counted(
     return deviation - shift, int(own[known]) if known < len(own) else len(time)
 
 
-def _said(
-    model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray, shown: _Shown
-) -> _Answers:
+def _said(model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArray, zero: FloatArray) -> _Answers:
     """Return the output of the model per row; it is held at unused readings."""
     rows, n = np.flatnonzero(used), len(time)
     if not rows.size:
         return _Answers(np.zeros(n), np.zeros(n, dtype=np.bool_), np.full(n, np.nan), np.zeros((n, 0)))
     state = model.init()._replace(reference=zero)
     ran = model.run(state, values[rows], np.diff(time[rows], prepend=time[rows[0]]))
-    width = model.widen(ran.change, ran.outputs, ran.deviation) if shown.band else np.full(len(rows), np.nan)
-    directions = ran.outputs[:, 1:] if shown.directions else np.zeros((len(rows), 0))
     last = np.cumsum(used) - 1  # index of the last used reading, per row
 
     def spread(values: FloatArray, before: float) -> FloatArray:
@@ -228,8 +218,8 @@ def _said(
     return _Answers(
         deviation=spread(ran.deviation, 0.0),
         outside=spread(ran.outside.max(axis=1, initial=0.0), 0.0) > 0,
-        half_width=spread(width, np.nan),
-        directions=spread(directions, 0.0),
+        half_width=spread(model.widen(ran.change, ran.outputs, ran.deviation), np.nan),
+        directions=spread(ran.outputs[:, 1:], 0.0),
     )
 
 

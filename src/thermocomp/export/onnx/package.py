@@ -62,8 +62,8 @@ fade; `thermocomp export --to c99` writes all of this in C.
 
 `deviation` is actual minus commanded; the correction is its negative. `outside` marks the inputs outside the trained
 range. If a value is not finite, or `dt` is negative, `deviation` is NaN and the state does not change. The state
-consists of a flag (1 after the first reading), the last deviation, and the memory. A model with a fixed interval makes at most 100,000 ticks
-in a call (17 days at 15 s).{axes}
+consists of a flag (1 after the first reading), the last deviation, and the memory. A model with a
+fixed interval makes at most 100,000 ticks in a call (17 days at 15 s).{axes}
 """
 
 _AXES = """
