@@ -162,3 +162,12 @@ def test_memory_of_a_fast_source_is_bounded() -> None:
         if k >= 2:
             sizes.add(len(pickle.dumps(averaged)))
     assert len(sizes) == 1
+
+
+@pytest.mark.parametrize("time", [20.0, 10.0, -1e6])
+@pytest.mark.parametrize("others", [1, 2, 3])
+def test_a_reading_that_is_not_later_does_not_count(time: float, others: int) -> None:
+    averaged = ZeroMean()
+    for k in range(others):
+        averaged = averaged.add(20.0 - 10.0 * (others - 1 - k), np.array([20.0 + k]), resting=True)
+    assert averaged.add(time, np.array([99.0]), resting=True) is averaged
