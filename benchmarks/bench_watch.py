@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermocomp.core.watch import LASTING, Watch
+from thermocomp.core.thresholds import THRESHOLDS
+from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.samples import Samples
@@ -117,7 +118,9 @@ def swaps(watch: Watch, samples: Samples, cycle: int) -> Iterator[tuple[str, boo
             what = "another pair named"
         else:
             what = "one by one" if accused <= {i, j} else "another sensor reported"
-        differ = bool(len(apart)) and len(apart) * float(np.median(np.diff(samples.time[rows]))) > LASTING
+        differ = (
+            bool(len(apart)) and len(apart) * float(np.median(np.diff(samples.time[rows]))) > THRESHOLDS.fault_duration
+        )
         yield what, differ, float(when[run] - samples.time[apart[0]]) if differ else np.nan
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from thermocomp.core.bounds import GAP
 from thermocomp.core.inputs import Input
 from thermocomp.core.reading import Reading
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.st.structuredtext import translate as translate_st
 from thermocomp.export.vectors import STATUS
@@ -25,7 +26,7 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.assembly import functions
 from thermocomp.runtime.program.memory import ARRAYS, FlatMemory
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.state import FORGOTTEN, Compensated, CompensatorState, resume, silence
+from thermocomp.runtime.state import Compensated, CompensatorState, resume, silence
 from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
@@ -55,7 +56,7 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
     state, time, begun, outside = compensator.start(), 0.0, False, 0
     for k, (values, age, dt, ahead, restarts, stored, resumed) in enumerate(zip(*map(_listed, stream), strict=True)):
         if restarts:  # longer ago than the memory of the models
-            state = resume(_stored(state, compensator), compensator.start(), 2 * FORGOTTEN)
+            state = resume(_stored(state, compensator), compensator.start(), 2 * THRESHOLDS.resumable)
             time, begun, outside = 0.0, False, 0
         elif stored:
             state = _stored(state, compensator)
@@ -66,7 +67,7 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
             shown = ahead
         if resumed and state.clock is not None:
             outage = silence(state, time)
-            if outage <= FORGOTTEN:
+            if outage <= THRESHOLDS.resumable:
                 left = _stored(state, compensator)
                 # corrections wait in an outage: here they go on, as those of a program that is not started again
                 state = resume(left, compensator.start(), outage, tick=time)._replace(clock=before)

@@ -15,8 +15,9 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.runtime import adaptation, batch
-from thermocomp.runtime.adaptation import APART, OFFSET, STRUCTURES, SUSPECT, UNEXPLAINED, Probing
+from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import Advanced
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate
@@ -39,10 +40,10 @@ MODEL = PacedDynamic(
 )
 
 
-def test_it_is_a_kalman_filter(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(adaptation, "SUSPECT", math.inf)
+def test_it_is_a_kalman_filter() -> None:
+    free = replace(THRESHOLDS, suspect=1e5, suspect_first=1e5, implausible=1e6)
     rng = np.random.default_rng(0)
-    kinds, prior = np.array([STRUCTURES, STRUCTURES, OFFSET]), np.diag([1.0, 1.0, 4.0])
+    kinds, prior = np.array([7 * 86400.0, 7 * 86400.0, 4 * HOUR]), np.diag([1.0, 1.0, 4.0])
     mean, covariance, last = np.zeros(3), prior.copy(), 0.0
     found = adaptation.begin(2.0, 2)
     for time in np.cumsum(rng.uniform(0.0, 4 * HOUR, 30)).tolist():
@@ -54,18 +55,18 @@ def test_it_is_a_kalman_filter(monkeypatch: pytest.MonkeyPatch) -> None:
         assert found.narrowing(time, directions, 2.0) == pytest.approx(
             math.sqrt(h @ covariance @ h / (h @ prior @ h)), rel=1e-9
         )
-        found, why = adaptation.take(found, directions, time, error, 0.5)
+        found, why = adaptation.take(found, directions, time, error, 0.5, free)
         assert not why
-        gain = covariance @ h / (h @ covariance @ h + (UNEXPLAINED * 2.0) ** 2 + 0.5**2)
+        gain = covariance @ h / (h @ covariance @ h + (THRESHOLDS.unexplained * 2.0) ** 2 + 0.5**2)
         mean, covariance, last = mean + gain * (error - h @ mean), covariance - np.outer(gain, h @ covariance), time
 
 
 def test_what_it_learned_is_forgotten() -> None:
     found, _ = adaptation.take(adaptation.begin(2.0, 0), np.zeros(0), 0.0, 3.0, 0.0)
     assert found.shift(1.0, np.zeros(0)) == pytest.approx(3.0, rel=0.05)
-    assert found.shift(OFFSET, np.zeros(0)) == pytest.approx(found.shift(0.0, np.zeros(0)) / math.e)
+    assert found.shift(THRESHOLDS.offset_decay, np.zeros(0)) == pytest.approx(found.shift(0.0, np.zeros(0)) / math.e)
     assert found.narrowing(0.0, np.zeros(0), 1.0) < 0.3
-    assert found.narrowing(20 * OFFSET, np.zeros(0), 1.0) == pytest.approx(1.0)
+    assert found.narrowing(20 * THRESHOLDS.offset_decay, np.zeros(0), 1.0) == pytest.approx(1.0)
 
 
 NOTHING = np.zeros(0)
@@ -83,17 +84,17 @@ def test_what_is_implausible_moves_nothing(error: float) -> None:
 def test_two_that_agree_and_are_apart_are_taken_and_a_third_that_does_not_is_not() -> None:
     before, why = adaptation.take(adaptation.begin(2.0, 1), np.ones(1), 0.0, 40.0, 0.5)
     assert "+40.0 um from the expected value, where at most 9.3 um are plausible: measure again after 10 min" in why
-    other, why = adaptation.take(before, np.ones(1), APART, -40.0, 0.5)
+    other, why = adaptation.take(before, np.ones(1), THRESHOLDS.probing_interval, -40.0, 0.5)
     assert why
-    assert other.shift(APART, np.ones(1)) == 0.0
+    assert other.shift(THRESHOLDS.probing_interval, np.ones(1)) == 0.0
     soon = before
-    for time in (1.0, 60.0, APART - 1.0):
+    for time in (1.0, 60.0, THRESHOLDS.probing_interval - 1.0):
         soon, why = adaptation.take(soon, np.ones(1), time, 41.0, 0.5)
         assert why
-    assert soon.shift(APART, np.ones(1)) == 0.0
-    after, why = adaptation.take(soon, np.ones(1), APART, 41.0, 0.5)
+    assert soon.shift(THRESHOLDS.probing_interval, np.ones(1)) == 0.0
+    after, why = adaptation.take(soon, np.ones(1), THRESHOLDS.probing_interval, 41.0, 0.5)
     assert not why
-    assert after.shift(APART, np.ones(1)) == pytest.approx(41.0, rel=0.01)
+    assert after.shift(THRESHOLDS.probing_interval, np.ones(1)) == pytest.approx(41.0, rel=0.01)
 
 
 def test_an_error_that_lasts_is_taken_each_time_once_two_probings_agreed() -> None:
@@ -104,7 +105,7 @@ def test_an_error_that_lasts_is_taken_each_time_once_two_probings_agreed() -> No
         if k > 1:
             assert found.shift(2 * HOUR * k, NOTHING) == pytest.approx(60.0, rel=0.02)
     assert refused == [1]
-    assert found.narrowing(20 * OFFSET + found.time, NOTHING, 1.0) == pytest.approx(10.0)
+    assert found.narrowing(20 * THRESHOLDS.offset_decay + found.time, NOTHING, 1.0) == pytest.approx(10.0)
     wild, why = adaptation.take(found, NOTHING, 26 * HOUR, 300.0, 0.5)
     assert why
     assert wild.shift(26 * HOUR, NOTHING) < 60.0
@@ -115,7 +116,7 @@ def test_one_alone_moves_no_further_than_what_is_suspect(
     error: float, size: float, typical: float, spread: float
 ) -> None:
     found, _ = adaptation.take(adaptation.begin(size, 0, typical), NOTHING, 60.0, error, spread)
-    assert 0.0 <= found.shift(60.0, NOTHING) <= min(error, SUSPECT * size) + 1e-9
+    assert 0.0 <= found.shift(60.0, NOTHING) <= min(error, THRESHOLDS.suspect * size) + 1e-9
 
 
 def test_of_those_that_are_suspect_the_further_counts_less() -> None:
@@ -140,9 +141,9 @@ def test_in_the_same_chip_ten_are_one() -> None:
         found, why = adaptation.take(found, NOTHING, 60.0 + 5.0 * k, 7.0 + 0.1 * k, 0.0)
         assert "as implausible as the previous probing" in why
     assert found.shift(60.0, NOTHING) == once < 5.0
-    found, why = adaptation.take(found, NOTHING, 60.0 + APART, 7.0, 0.0)
+    found, why = adaptation.take(found, NOTHING, 60.0 + THRESHOLDS.probing_interval, 7.0, 0.0)
     assert not why
-    assert found.shift(60.0 + APART, NOTHING) == pytest.approx(7.0, rel=0.05)
+    assert found.shift(60.0 + THRESHOLDS.probing_interval, NOTHING) == pytest.approx(7.0, rel=0.05)
 
 
 def test_on_a_day_of_small_errors_less_is_plausible() -> None:

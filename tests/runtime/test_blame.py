@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.core.watch import LASTING, Watch
+from thermocomp.core.thresholds import THRESHOLDS
+from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
@@ -65,7 +66,7 @@ def test_every_pair_is_named_once_its_responses_differ(watch: Watch, samples: Sa
     change, off, differ, named = samples.change(), watch.limits("off"), 0, 0
     for k, (i, j) in enumerate(PAIRS, start=1):
         apart = samples.time[np.abs(change[:, i] - change[:, j]) > max(off[i], off[j])]
-        if len(apart) * 60.0 <= LASTING:
+        if len(apart) * 60.0 <= THRESHOLDS.fault_duration:
             assert not np.delete(found[k], [i, j]).any()
             continue
         differ += 1

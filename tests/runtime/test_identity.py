@@ -8,12 +8,13 @@ import pytest
 from test_adaptation import MODEL
 
 from thermocomp.core.reading import Reading
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.live import statefile
-from thermocomp.runtime.adaptation import APART, Probing
+from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.identity import KNOWN, MOST_KEYS, remember
 from thermocomp.runtime.orders import rezero
-from thermocomp.runtime.state import FORGOTTEN, CompensatorState, resume
+from thermocomp.runtime.state import CompensatorState, resume
 
 RUNNING = Compensator.of([MODEL])
 #: as sent again and again: with an id, with a time, with both, with neither
@@ -54,7 +55,9 @@ def test_one_id_or_one_time_is_one_probing_whatever_else_it_says() -> None:
 
 def test_two_that_are_two_but_not_apart_confirm_nothing() -> None:
     """A chip on the sphere is there a minute later, too."""
-    each = {10 + k: Probing(9.0 + 0.01 * k, 0.5, keys=(f"id {k}",)) for k in range(int(APART / 60.0))}
+    each = {
+        10 + k: Probing(9.0 + 0.01 * k, 0.5, keys=(f"id {k}",)) for k in range(int(THRESHOLDS.probing_interval / 60.0))
+    }
     found = list(run(each, 100))
     assert all(found[k][1] for k in each)
     assert shift(found[-1][0]) == 0.0
@@ -77,7 +80,9 @@ def test_it_is_known_after_a_restart_and_a_new_zero(tmp_path: Path) -> None:
 def test_it_is_forgotten_after_a_day_and_many_are_not_kept() -> None:
     state = list(run({10: SENT[3]}, 100))[-1][0]
     assert list(state.probed["z"].values()) == [600.0]
-    assert remember(state, {"z": Probing(1.0, keys=("new",))}, 600.0 + FORGOTTEN + 1.0)["z"] == {"new": 87001.0}
+    assert remember(state, {"z": Probing(1.0, keys=("new",))}, 600.0 + THRESHOLDS.resumable + 1.0)["z"] == {
+        "new": 87001.0
+    }
     for k in range(2 * MOST_KEYS):
         state = state._replace(probed=remember(state, {"z": Probing(1.0, keys=(f"id {k}",))}, 700.0 + k))
     assert len(state.probed["z"]) == MOST_KEYS

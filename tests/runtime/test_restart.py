@@ -14,10 +14,11 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.reading import Reading
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero
-from thermocomp.runtime.state import FORGOTTEN, CompensatorState, Status, resume, silence
+from thermocomp.runtime.state import CompensatorState, Status, resume, silence
 
 HOUR = 3600.0
 LIMITS = Limits(rate=0.05)
@@ -81,7 +82,7 @@ def test_the_monotone_clock_of_a_new_process_begins_anywhere() -> None:
         assert said.corrections["z"].offset == pytest.approx(before[-1], abs=2.0)
 
 
-@pytest.mark.parametrize("age", [FORGOTTEN + 1.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("age", [THRESHOLDS.resumable + 1.0, -1.0, math.nan, math.inf])
 def test_what_is_too_old_or_of_unknown_age_begins_anew_but_moves_from_where_it_is(age: float) -> None:
     state, before, _ = run(MACHINE.start(), 0.0, 4 * HOUR)
     again = resume(state, MACHINE.start(), age)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.bounds import COEFFICIENT, LEAST, check_between
 from thermocomp.core.exceptions import SettingError
-from thermocomp.core.zero import STANDS
+from thermocomp.core.thresholds import THRESHOLDS
 
 FloatArray = NDArray[np.float64]
 
@@ -82,11 +82,13 @@ class Band:
             "averaged models disagree"
         )
 
-    def turning(self, change: FloatArray) -> NDArray[np.bool_]:
-        """Return whether the spindle turns, for input states of shape (..., n_inputs)."""
-        return np.asarray(np.logical_or.reduce([np.abs(change[..., k]) > STANDS for k in self.speeds]))
+    def turning(self, change: FloatArray, stopped: float = THRESHOLDS.stopped_speed) -> NDArray[np.bool_]:
+        """Return whether the spindle turns faster than `stopped`, for input states of shape (..., n_inputs)."""
+        return np.asarray(np.logical_or.reduce([np.abs(change[..., k]) > stopped for k in self.speeds]))
 
-    def half_width(self, change: FloatArray, spread: FloatArray) -> FloatArray:
+    def half_width(
+        self, change: FloatArray, spread: FloatArray, stopped: float = THRESHOLDS.stopped_speed
+    ) -> FloatArray:
         """Return the half-width for states of the inputs.
 
         Parameters
@@ -95,6 +97,8 @@ class Band:
             Inputs minus their reference [their units].
         spread : ndarray of shape (...,)
             Spread of the averaged regressions [unit].
+        stopped : float
+            Largest speed that counts as stopped [1/min].
 
         Returns
         -------
@@ -103,5 +107,5 @@ class Band:
         """
         factor: FloatArray | float = max(self.running, self.stopped)
         if self.speeds:
-            factor = np.where(self.turning(change), self.running, self.stopped)
+            factor = np.where(self.turning(change, stopped), self.running, self.stopped)
         return np.asarray(factor * np.sqrt(self.floor**2 + spread**2))

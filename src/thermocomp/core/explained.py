@@ -9,7 +9,8 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.contributions import gains
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
-from thermocomp.core.watch import LASTING, Watched
+from thermocomp.core.thresholds import Threshold
+from thermocomp.core.watch import Watched
 
 #: a spare sensor is recommended if a larger drift of a sensor may stay undetected [degC]
 FAR = 3.0
@@ -101,6 +102,8 @@ class Explanation:
     pairs : tuple of int
         Number of sensor pairs whose simultaneous failure was tested, and number of these for which the correction
         continues.
+    thresholds : tuple of Threshold
+        Fixed numbers by which the compensator decides.
     """
 
     target: str
@@ -120,6 +123,7 @@ class Explanation:
     outside: str
     covered: str
     pairs: tuple[int, int]
+    thresholds: tuple[Threshold, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the explanation as plain numbers and text."""
@@ -191,6 +195,7 @@ def explain(model: ErrorModel) -> Explanation:
         outside=_outside(model),
         covered=_covered(model),
         pairs=(len(several), sum(model.may_lose(names.split(", ")) for names in several)),
+        thresholds=model.thresholds.rows,
     )
 
 
@@ -297,9 +302,10 @@ def _lines(e: Explanation) -> list[str]:
     lines.append(f"Outside the trained range: {e.outside}.")
     watched = [s for s in e.sensors if s.watched]
     if watched:
+        lasting = next(t.value for t in e.thresholds if t.name == "fault_duration")
         lines.append(
             "A missing temperature is detected immediately; one that has jumped, drifted or is stuck is detected "
-            f"{_span(LASTING)} after it exceeds its limit. It is replaced by its prediction from the other "
+            f"{_span(lasting)} after it exceeds its limit. It is replaced by its prediction from the other "
             "temperatures and the spindle speed. Limits and errors:"
         )
     else:

@@ -28,6 +28,7 @@ from thermocomp.core.layers import Layers
 from thermocomp.core.provenance import HonestError, Provenance, read_approval
 from thermocomp.core.rows import Replayable
 from thermocomp.core.state import RunOutputs, State
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.validity import Validity
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import FIRST_READING, Zeroing
@@ -67,6 +68,8 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         Uncertainty band; None if not estimated.
     watch : Watch or None
         Checks of the temperatures, and substitute values for rejected ones.
+    thresholds : Thresholds
+        Fixed numbers by which the compensator decides.
 
     Examples
     --------
@@ -90,6 +93,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
     zeroing: Zeroing = FIRST_READING
     band: Band | None = None
     watch: Watch | None = field(default=None, repr=False)
+    thresholds: Thresholds = field(default=THRESHOLDS, repr=False)
 
     def __post_init__(self) -> None:
         check_name("target", self.target)
@@ -107,6 +111,8 @@ class ErrorModel(Gated, Replayable, ModelFamily):
             raise SettingError(
                 f"{owner}: its band uses input index {max(self.band.speeds)}: expected 0 to {len(names) - 1}"
             )
+        if self.watch is not None and self.watch.thresholds != self.thresholds:
+            raise SettingError(f"{owner}: its watch (sensor monitoring) has other thresholds than the model")
         self._check()
 
     def __getstate__(self) -> dict[str, object]:
@@ -285,7 +291,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         if self.support.policy != "clip":
             kept = np.abs(outputs[..., 0] - deviation)
         spread = np.sqrt((outputs[..., 1:] ** 2).sum(axis=-1))
-        return self.band.half_width(change, spread) + kept
+        return self.band.half_width(change, spread, self.thresholds.stopped_speed) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return the directions in which the regressions averaged by the model differ.

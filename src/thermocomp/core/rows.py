@@ -13,6 +13,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.expression import Node
 from thermocomp.core.inputs import Input
 from thermocomp.core.state import RunOutputs, State
+from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.zero import Zeroing, find_zero
 
 
@@ -34,6 +35,10 @@ class Runnable(Protocol):
     @property
     def zeroing(self) -> Zeroing:
         """Averaging time of the reference of the inputs."""
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """Fixed numbers by which the compensator decides."""
 
     def init(self, reference: ArrayLike | None = None) -> State:
         """Return the state of a machine that has just been zeroed."""
@@ -81,7 +86,9 @@ def run_table(
     resting = np.zeros(n, dtype=np.bool_)
     if model.zeroing.speed in table:
         speed = read_numbers(table, model.zeroing.speed, f"model of {model.target}")
-        resting = np.array([model.zeroing.stands(v) for v in speed.tolist()], dtype=np.bool_)
+        resting = np.array(
+            [model.zeroing.stands(v, model.thresholds.stopped_speed) for v in speed.tolist()], dtype=np.bool_
+        )
     runs, places, done = list[RunOutputs](), np.full(n, -1), 0
     for a, b in pairwise([0, *(k for k in range(1, n) if starts[k]), n]):
         own, rows = slice(a, b), a + np.flatnonzero(usable[a:b])

@@ -166,7 +166,9 @@ class Stack:
             if m.band is not None:
                 spread = np.sqrt((said[..., self._ends[k] : self._ends[k + 1]] ** 2).sum(axis=-1))
                 kept = 0.0 if m.support.policy == "clip" else np.abs(said[..., k] - state.deviation[..., k])
-                found[..., k] = m.band.half_width(clipped[..., self._taps[k]], spread) + kept
+                found[..., k] = (
+                    m.band.half_width(clipped[..., self._taps[k]], spread, m.thresholds.stopped_speed) + kept
+                )
         return found
 
     def outside(self, state: StackState) -> tuple[str, ...]:

@@ -21,17 +21,11 @@ from thermocomp.core.bounds import (
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.pacedbank import Bank
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.zero import FIRST_READING, Zeroing
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
-
-#: minimum duration of a jump or a difference that counts as a failure [s]
-LASTING = 300.0
-#: largest speed, relative to the highest trained one, at which differences are evaluated
-FASTER = 1.02
-#: lower bound of the prediction error by which differences are weighted [degC]
-LEAST_UNSEEN = 0.05
 
 
 @dataclass(frozen=True)
@@ -86,6 +80,8 @@ class Watch:
         One per temperature, in the order of the inputs.
     pace : float
         Time within which a change counts as a jump [s].
+    thresholds : Thresholds
+        Those of the models that the watch belongs to.
 
     Raises
     ------
@@ -100,6 +96,7 @@ class Watch:
     states: tuple[tuple[int, float, float, float], ...] = ()
     sensors: tuple[Watched, ...] = ()
     pace: float = 60.0
+    thresholds: Thresholds = THRESHOLDS
 
     def __post_init__(self) -> None:
         check_count("watch", INPUTS, inputs=self.inputs)
@@ -186,7 +183,7 @@ class Watch:
     def _limits(self) -> dict[str, FloatArray]:
         names = ("off", "jump", "moved", "still", "unseen")
         found = {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
-        found["unseen"] = np.maximum(found["unseen"], LEAST_UNSEEN)
+        found["unseen"] = np.maximum(found["unseen"], self.thresholds.least_unseen)
         return found
 
     @cached_property

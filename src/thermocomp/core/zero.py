@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.bounds import GAP, check_between, check_name
+from thermocomp.core.thresholds import THRESHOLDS
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-
-#: below this speed the spindle counts as stopped: a tachometer may show a few revolutions at rest [1/min]
-STANDS = 10.0
 
 
 @dataclass(frozen=True)
@@ -51,9 +49,9 @@ class Zeroing:
         if self.speed:
             check_name("zero", self.speed)
 
-    def stands(self, speed: object) -> bool:
-        """Return whether a reading of `speed` shows that the spindle is stopped; False if it is not a number."""
-        return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= STANDS
+    def stands(self, speed: object, most: float = THRESHOLDS.stopped_speed) -> bool:
+        """Return whether a reading of `speed`, at most `most`, shows a stopped spindle; False if it is not a number."""
+        return isinstance(speed, float | int) and type(speed) is not bool and abs(speed) <= most
 
     def span(self, resting: bool) -> float:
         """Return the averaging time if the spindle was stopped in the first reading, or not [s]."""

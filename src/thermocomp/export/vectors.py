@@ -20,7 +20,7 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.watch import RETURN, WORDS
+from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -133,7 +133,7 @@ def make_readings(tables: Tables) -> Readings:
     or out-of-order readings; a source that stops until the corrections have faded to zero, and its return; sensors that
     stick, step and drift one after the other; values beyond the trained range.
     """
-    machine = Warming(tables)
+    machine, back = Warming(tables), tables.models[0].thresholds.return_time
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
     rows: list[tuple[FloatArray, float, float]] = []
@@ -153,7 +153,7 @@ def make_readings(tables: Tables) -> Readings:
             values[c] = wild
             add(values, 15.0)
         for _ in range(4):  # until the value is trusted again
-            add(machine.run(0.8, RETURN / 3), RETURN / 3)
+            add(machine.run(0.8, back / 3), back / 3)
     _turn(machine, add, 30)
     warm = machine.run(0.8, 10.0)
     for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):

@@ -50,7 +50,7 @@ class Format:
     shared: tuple[str, ...] = ()
 
 
-MODELS = Format(name="thermocomp-model", version=1, words="model file", command="thermocomp fit", shared=("watch",))
+MODELS = Format("thermocomp-model", 1, "model file", "thermocomp fit", shared=("watch", "thresholds"))
 POSITION_MODELS = Format("thermocomp-position-model", 1, "position model file", "thermocomp position")
 _KNOWN = {f.name: f for f in (MODELS, POSITION_MODELS)}
 

@@ -15,6 +15,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Network
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
 
@@ -34,15 +35,17 @@ def dumps(models: Sequence[ErrorModel]) -> str:
     ------
     ModelFileError
         A model belongs to a family that cannot be stored, such as a Gaussian process, which has no coefficients; or two
-        models have different watches (sensor monitoring).
+        models have different watches (sensor monitoring) or thresholds.
     """
     _check_judged(models, "model file")
     watch = next((m.watch for m in models if m.watch is not None), None)
-    if any(m.watch != watch for m in models):
+    if any(m.watch != watch or m.thresholds != models[0].thresholds for m in models):
         raise ModelFileError(
-            "model file: its models have different watches (sensor monitoring); write them to separate files"
+            "model file: its models have different watches (sensor monitoring) or thresholds; write them to separate "
+            "files"
         )
-    shared = None if watch is None else {"watch": asdict(watch)}
+    shared: dict[str, Any] = {} if watch is None else {"watch": watch_entry(watch)}
+    shared["thresholds"] = asdict(models[0].thresholds if models else THRESHOLDS)
     return jsonfile.pack(jsonfile.MODELS, [entry_of(m) for m in models], shared)
 
 
@@ -60,13 +63,15 @@ def loads(text: str, source: str = "model") -> tuple[ErrorModel, ...]:
     ModelFileError
         Not JSON, not a model file, of a newer version, altered or incomplete; the message lists all faults.
     """
-    found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch)
+    found = jsonfile.unpack(jsonfile.MODELS, Entry, text, source, watch=Watch, thresholds=Thresholds)
     if any(m.watch is not None for m in found.models):
         raise ModelFileError(
             f"{source}: a watch (sensor monitoring) is stored inside a model; it must be stored once in the file, "
             "next to the models"
         )
-    models = tuple(replace(m, watch=found.watch) for m in found.models) if found.watch else tuple(found.models)
+    thresholds = found.thresholds or THRESHOLDS  # files of versions before they were stored
+    watch = replace(found.watch, thresholds=thresholds) if found.watch else None
+    models = tuple(replace(m, watch=watch, thresholds=thresholds) for m in found.models)
     _check_judged(models, source)
     return models
 
@@ -107,7 +112,14 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
             f"a file may hold {', '.join(FAMILIES)}"
         )
     entry = asdict(replace(model, watch=None))
-    del entry["watch"]  # stored once per file
+    del entry["watch"], entry["thresholds"]  # stored once per file
+    return entry
+
+
+def watch_entry(watch: Watch) -> dict[str, Any]:
+    """Return a watch as stored in a file."""
+    entry = asdict(watch)
+    del entry["thresholds"]  # stored once per file
     return entry
 
 

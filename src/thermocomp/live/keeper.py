@@ -53,7 +53,7 @@ class StateKeeper:
             self._refused = self._path
             return cold
         age = (datetime.now(UTC) - saved.written).total_seconds() * self._clock.speed
-        state = resume(saved.state, cold, age, tick=self._clock.tick())
+        state = resume(saved.state, cold, age, None, self._clock.tick(), self._compensator.thresholds.resumable)
         # orders by the controller or the configuration are not restored: they are issued again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
         state = state._replace(orders=cold.orders | own)

@@ -13,9 +13,10 @@ from pydantic import AwareDatetime
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.files import jsonfile
-from thermocomp.files.modelfile import entry_of
+from thermocomp.files.modelfile import entry_of, watch_entry
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState
@@ -61,9 +62,11 @@ class Saved:
 
 def fingerprint(compensator: Compensator) -> str:
     """Return a hash of the models of a compensator, by which a state file is matched to them."""
-    watches = [asdict(w) for w in compensator.watches]
     entries = [entry_of(m) for m in compensator.models]
-    text = json.dumps([list(compensator.lines), entries, watches], sort_keys=True, default=str)
+    found: list[object] = [list(compensator.lines), entries, [watch_entry(w) for w in compensator.watches]]
+    if compensator.thresholds != THRESHOLDS:
+        found.append(asdict(compensator.thresholds))
+    text = json.dumps(found, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

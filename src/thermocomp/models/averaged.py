@@ -9,7 +9,7 @@ import numpy as np
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
-from thermocomp.core.zero import STANDS
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.models.base import FloatArray, IntArray
 from thermocomp.models.numerics.folds import halve
 from thermocomp.models.numerics.structures import Moments, fit_each, share_out
@@ -181,7 +181,7 @@ class AveragedDynamic(TimedRegressor):
             stopped=self.stopped,
             running=self.running,
         )
-        turning = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0) > STANDS
+        turning = np.abs(rows[:, list(speeds)]).max(axis=1, initial=0.0) > THRESHOLDS.stopped_speed
         return features, *halve(folds, turning)
 
     def _predict(self, rows: FloatArray, step: FloatArray) -> FloatArray:

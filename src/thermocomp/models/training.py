@@ -18,7 +18,7 @@ from thermocomp.core.inputs import Support
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import Provenance
-from thermocomp.core.zero import STANDS
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.models.bands import find_band
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.covering import find_joint_support
@@ -208,7 +208,7 @@ def _band(model: ErrorModel, samples: Samples, target: int, left_out: FloatArray
         samples.deviations[known, target] - left_out[known, 0],
         left_out[known, 1],
         samples.cycle[known],
-        np.asarray((np.abs(samples.change()[known][:, columns]) > STANDS).any(axis=1)),
+        np.asarray((np.abs(samples.change()[known][:, columns]) > THRESHOLDS.stopped_speed).any(axis=1)),
         speeds,
     )
 

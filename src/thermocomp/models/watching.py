@@ -8,7 +8,8 @@ from scipy.ndimage import median_filter
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.bounds import GAP
-from thermocomp.core.watch import FASTER, LASTING, Watch, Watched
+from thermocomp.core.thresholds import THRESHOLDS
+from thermocomp.core.watch import Watch, Watched
 from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
@@ -131,7 +132,7 @@ def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
     found = np.ones(len(speed), dtype=np.bool_)
     for k in range(int(folds.max()) + 1):
         others = (folds >= 0) & (folds != k)
-        faster = (folds == k) & (speed > FASTER * speed[others].max(initial=0.0))
+        faster = (folds == k) & (speed > THRESHOLDS.fast_factor * speed[others].max(initial=0.0))
         for t in np.unique(test[faster]):
             own = (folds == k) & (test == t)
             own[: np.flatnonzero(faster & own)[0]] = False
@@ -142,7 +143,7 @@ def _covered(speed: FloatArray, folds: IntArray, test: IntArray) -> BoolArray:
 def _jump(values: FloatArray, time: FloatArray, folds: IntArray, pace: float) -> float:
     """Return the largest lasting change within `pace`, over the training rows."""
     usual = max(float(np.median(np.diff(time)[np.diff(time) > 0])), 1e-9)
-    lasting = median_filter(values, size=1 + 2 * round(LASTING / 2 / usual), mode="nearest")
+    lasting = median_filter(values, size=1 + 2 * round(THRESHOLDS.fault_duration / 2 / usual), mode="nearest")
     largest = 0.0
     for shift in range(1, 1 + max(1, round(pace / usual))):
         gap = time[shift:] - time[:-shift]

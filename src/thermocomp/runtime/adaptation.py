@@ -7,9 +7,9 @@ the present state of the machine; the coefficients represent what the training l
 Without a probing, the output of the model is unchanged.
 
 A probing can be wrong: a chip on the sphere, the wrong tool, another unit. A single probing moves a model by no more
-than `SUSPECT` standard deviations of the expected error, and the less, the further beyond that it is; two probings that
-agree and are separated in time count in full; and no probing, however often repeated, moves a model beyond its largest
-possible error (`find_most`).
+than `Thresholds.suspect` standard deviations of the expected error, and the less, the further beyond that it is; two
+probings that agree and are separated in time count in full; and no probing, however often repeated, moves a model
+beyond its largest possible error (`find_most`).
 """
 
 from typing import NamedTuple
@@ -17,33 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 
-#: decay time constants of the offset and of the coefficients of the directions [s]
-OFFSET, STRUCTURES = 4 * 3600.0, 7 * 86400.0
-#: error that neither the offset nor the directions explain, as a share of the error on left-out cycles
-UNEXPLAINED = 0.2
-#: beyond this many standard deviations from the expected value, the weight of an unconfirmed probing decreases with the
-#: distance; if there was none in the preceding hours, it decreases from a smaller distance, to zero at `IMPLAUSIBLE`
-#: (Hampel's redescending influence function)
-SUSPECT, SUSPECT_FIRST = 2.5, 2.0
-#: beyond this many standard deviations from the expected value, a probing is refused
-IMPLAUSIBLE = 4.0
-#: lower bound of the typical error as a share of the overall RMS: errors in most cycles and days are smaller
-LEAST_USUAL = 0.5
-#: number of probings over which the size of the present day's errors is averaged
-MEMORY = 5.0
-#: two probings confirm each other if they agree within this many standard deviations and are at least this far apart in
-#: time [s]
-AGREED, APART = 5.0, 600.0
-#: two probings that confirm each other show that the machine behaves differently than in the validation of the model:
-#: from then on, their error counts as this many standard deviations of the offset
-UNLIKE = 3.0
-#: upper bounds of a model's error, as multiples of its error on left-out cycles and of the drift without compensation
-#: (both root mean squares)
-MOST, MOST_OF_DRIFT = 10.0, 3.0
-#: lower bound of all assumed errors [um]
-LEAST = 1e-3
+FloatArray = NDArray[np.float64]
 
 
 class Probing(NamedTuple):
@@ -77,15 +53,17 @@ class Adaptation(NamedTuple):
     most: float = np.inf  #: maximum change of the model by probings [um]
     usual: float = 1.0  #: variance of the errors on the present day, relative to that of the size
 
-    def at(self, time: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+    def at(self, time: FloatArray | float, thresholds: Thresholds = THRESHOLDS) -> tuple[FloatArray, FloatArray]:
         """Return mean, (..., n), and covariance, (..., n, n), at later times [s], decaying to their prior values."""
-        kept = self._kept(time)
+        kept = self._kept(time, thresholds)
         prior = np.ones(len(self.mean))
         prior[-1] = self.spread**2
         covariance = kept[..., :, None] * self.covariance * kept[..., None, :]
         return kept * self.mean, covariance + np.eye(len(prior)) * ((1.0 - kept**2) * prior)[..., None, :]
 
-    def shift(self, time: FloatArray | float, directions: FloatArray) -> FloatArray:
+    def shift(
+        self, time: FloatArray | float, directions: FloatArray, thresholds: Thresholds = THRESHOLDS
+    ) -> FloatArray:
         """Return the value added to the deviation at later times.
 
         Parameters
@@ -100,27 +78,29 @@ class Adaptation(NamedTuple):
         ndarray of shape (...,)
             [um]
         """
-        found = (self._kept(time) * self.mean * _beside(directions, 1.0)).sum(axis=-1)
+        found = (self._kept(time, thresholds) * self.mean * _beside(directions, 1.0)).sum(axis=-1)
         return np.asarray(np.clip(found, -self.most, self.most))
 
-    def narrowing(self, time: FloatArray | float, directions: FloatArray, floor: float) -> FloatArray:
+    def narrowing(
+        self, time: FloatArray | float, directions: FloatArray, floor: float, thresholds: Thresholds = THRESHOLDS
+    ) -> FloatArray:
         """Return the factor on the half-width of an uncertainty band; `floor` is the floor of the band [um].
 
         It exceeds 1 if probings have shown that the machine behaves differently than in the validation of the band.
         """
-        _, covariance = self.at(time)
+        _, covariance = self.at(time, thresholds)
         weights = _beside(directions, floor / self.size)
         left = np.einsum("...i,...ij,...j->...", weights, covariance, weights)
         return np.asarray(np.sqrt(left / ((directions**2).sum(axis=-1) + floor**2)))
 
-    def _kept(self, time: FloatArray | float) -> FloatArray:
+    def _kept(self, time: FloatArray | float, thresholds: Thresholds = THRESHOLDS) -> FloatArray:
         gone = np.maximum(np.asarray(time) - self.time, 0.0)[..., None]
-        constants = np.full(len(self.mean), STRUCTURES)
-        constants[-1] = OFFSET
+        constants = np.full(len(self.mean), thresholds.direction_decay)
+        constants[-1] = thresholds.offset_decay
         return np.asarray(np.exp(-gone / constants))
 
 
-def find_most(size: float, drift: float, magnitude: float) -> float:
+def find_most(size: float, drift: float, magnitude: float, thresholds: Thresholds = THRESHOLDS) -> float:
     """Return the largest possible error of a model [um].
 
     Parameters
@@ -132,10 +112,17 @@ def find_most(size: float, drift: float, magnitude: float) -> float:
     magnitude : float
         Largest permitted correction [um].
     """
-    return min(MOST * max(size, LEAST), MOST_OF_DRIFT * max(drift, LEAST), magnitude)
+    least = thresholds.least_error
+    return min(thresholds.most_error * max(size, least), thresholds.most_drift * max(drift, least), magnitude)
 
 
-def begin(size: float, n_directions: int, typical: float = np.inf, most: float = np.inf) -> Adaptation:
+def begin(
+    size: float,
+    n_directions: int,
+    typical: float = np.inf,
+    most: float = np.inf,
+    thresholds: Thresholds = THRESHOLDS,
+) -> Adaptation:
     """Return the initial estimate, without a probing.
 
     Parameters
@@ -147,16 +134,21 @@ def begin(size: float, n_directions: int, typical: float = np.inf, most: float =
     most : float
         See `find_most` [um].
     """
-    size = max(size, LEAST)
+    size = max(size, thresholds.least_error)
     prior = np.diag([*[1.0] * n_directions, size**2])
-    usual = min(max(typical / size, LEAST_USUAL), 1.0) ** 2
+    usual = min(max(typical / size, thresholds.least_usual), 1.0) ** 2
     return Adaptation(
         mean=np.zeros(n_directions + 1), covariance=prior, size=size, spread=size, time=-np.inf, most=most, usual=usual
     )
 
 
 def take(
-    before: Adaptation, directions: FloatArray, time: float, error: float, repeatability: float
+    before: Adaptation,
+    directions: FloatArray,
+    time: float,
+    error: float,
+    repeatability: float,
+    thresholds: Thresholds = THRESHOLDS,
 ) -> tuple[Adaptation, str]:
     """Process a probing.
 
@@ -177,41 +169,43 @@ def take(
             f"{error} um with a repeatability of {repeatability} um: expected finite numbers, and a repeatability that "
             "is not negative",
         )
-    if abs(error) > before.most + IMPLAUSIBLE * repeatability:
+    if abs(error) > before.most + thresholds.implausible * repeatability:
         return before, (
             f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
             "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
         )
-    (mean, covariance), spread = before.at(time), before.spread
-    weights, own = _beside(directions, 1.0), (UNEXPLAINED * before.size) ** 2 + repeatability**2
+    (mean, covariance), spread = before.at(time, thresholds), before.spread
+    weights, own = _beside(directions, 1.0), (thresholds.unexplained * before.size) ** 2 + repeatability**2
     surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
-    alike = abs(error - before.refused) <= AGREED * (2 * own) ** 0.5
+    alike = abs(error - before.refused) <= thresholds.agreement * (2 * own) ** 0.5
     since = before.refused_since if alike else time
-    if alike and time - since < APART:  # possibly the same chip as before
+    if alike and time - since < thresholds.probing_interval:  # possibly the same chip as before
         return (
             before,
             "as implausible as the previous probing, and too soon to confirm it: measure again, at least "
-            f"{APART / 60:.0f} min after that one",
+            f"{thresholds.probing_interval / 60:.0f} min after that one",
         )
-    plausible = abs(surprise) <= IMPLAUSIBLE * typical
-    first = not time - before.time <= OFFSET
-    suspect = SUSPECT_FIRST if first else SUSPECT
+    plausible = abs(surprise) <= thresholds.implausible * typical
+    first = not time - before.time <= thresholds.offset_decay
+    suspect = thresholds.suspect_first if first else thresholds.suspect
     if alike and not plausible:  # confirmed
         covariance[-1, -1] += surprise**2
-        spread = max(spread, abs(surprise) / UNLIKE)
+        spread = max(spread, abs(surprise) / thresholds.confirmed)
     elif not alike and not plausible:
-        limit = f"at most {IMPLAUSIBLE * typical:.1f} um are plausible"
-        why = f"{surprise:+.1f} um from the expected value, where {limit}: measure again after {APART / 60:.0f} min"
+        limit = f"at most {thresholds.implausible * typical:.1f} um are plausible"
+        wait = f"measure again after {thresholds.probing_interval / 60:.0f} min"
+        why = f"{surprise:+.1f} um from the expected value, where {limit}: {wait}"
         return before._replace(refused=error, refused_since=since), why
     elif not alike and abs(surprise) > suspect * typical:  # possibly a bad probing
         far = abs(surprise) / typical
         weight = (suspect / far) ** 2
         if first:
-            weight *= max(IMPLAUSIBLE - far, 1e-6) / (IMPLAUSIBLE - suspect)
+            weight *= max(thresholds.implausible - far, 1e-6) / (thresholds.implausible - suspect)
         noise, doubt = own + (known + own) * (1.0 / weight - 1.0), (error, since)
-    usual = before.usual + (min(surprise**2 / (known + own), SUSPECT**2) - before.usual) / MEMORY
-    usual = max(usual, LEAST_USUAL**2)
+    seen = min(surprise**2 / (known + own), thresholds.suspect**2)
+    usual = before.usual + (seen - before.usual) / thresholds.probings_averaged
+    usual = max(usual, thresholds.least_usual**2)
     gain = covariance @ weights
     variance = float(weights @ gain) + noise
     after = covariance - np.outer(gain, gain) / variance

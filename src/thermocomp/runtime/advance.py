@@ -48,7 +48,8 @@ def advance(
         mine = [states[k] for k in group.members]
         values = np.array(group.ranges.pick(reading.values), dtype=np.float64)
         if mine[0].memory is None and np.isnan(mine[0].reference).any():
-            resting = group.lead.zeroing.stands(reading.values.get(group.lead.zeroing.speed))
+            zeroing, most = group.lead.zeroing, group.lead.thresholds.stopped_speed
+            resting = zeroing.stands(reading.values.get(zeroing.speed), most)
             mine, begun, known, values = _zeroed(group, mine, begins[first], (time, values, resting))
             for k in group.members:
                 begins[k] = begun

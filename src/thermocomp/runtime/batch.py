@@ -182,7 +182,8 @@ def _gated(model: ErrorModel, time: FloatArray, values: FloatArray, stands: Bool
         if window:
             zero = np.where(np.isnan(zero), averaged.mean, zero)
     later = slice(min(known + 1, len(time)) if known else 0, None)
-    bounds = [find_plausible_range(i, z) for i, z in zip(model.inputs, zero.tolist(), strict=True)]
+    of = zip(model.inputs, zero.tolist(), strict=True)
+    bounds = [find_plausible_range(i, z, model.thresholds) for i, z in of]
     low, high = np.array(bounds).reshape(-1, 2).T
     with np.errstate(invalid="ignore"):
         passed[later] &= ((values[later] >= low) & (values[later] <= high)).all(axis=1)
@@ -234,18 +235,22 @@ def _adapted(
     """Return outputs adapted by probings, the change due to probings, and the reasons for refused probings."""
     honest = model.honest_error
     size, typical, drift = (0.0, 0.0, 0.0) if honest is None else (honest.rms, honest.typical, honest.none_rms)
-    most = adaptation.find_most(size, drift, math.inf if limits is None else limits.magnitude)
-    learned = adaptation.begin(size, answers.directions.shape[1], typical, most)
+    most = adaptation.find_most(size, drift, math.inf if limits is None else limits.magnitude, model.thresholds)
+    learned = adaptation.begin(size, answers.directions.shape[1], typical, most, model.thresholds)
     shift, narrower, refused = np.zeros(len(time)), np.ones(len(time)), list[str]()
     rows = np.flatnonzero(np.isfinite(probed)).tolist()
     for row, following in zip(rows, [*rows, len(time)][1:], strict=True):
         error = float(probed[row] - answers.deviation[row])
-        learned, why = adaptation.take(learned, answers.directions[row], float(time[row]), error, repeatability)
+        learned, why = adaptation.take(
+            learned, answers.directions[row], float(time[row]), error, repeatability, model.thresholds
+        )
         refused += [why] if why else []
         later = slice(row + 1, following + 1)
-        shift[later] = learned.shift(time[later], answers.directions[later])
+        shift[later] = learned.shift(time[later], answers.directions[later], model.thresholds)
         if model.band is not None:
-            narrower[later] = learned.narrowing(time[later], answers.directions[later], model.band.floor)
+            narrower[later] = learned.narrowing(
+                time[later], answers.directions[later], model.band.floor, model.thresholds
+            )
     adapted = answers._replace(deviation=answers.deviation + shift, half_width=answers.half_width * narrower)
     return adapted, shift, tuple(refused)
 

@@ -11,12 +11,6 @@ from thermocomp.core.watch import Watch
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-#: time constant of the low-passed difference of reading and prediction [s]
-USUAL = 1800.0
-#: a swap is excluded once it has increased the mean square residual by this much, relative to the squared errors on
-#: unseen cycles
-AGAINST = 0.1
-
 
 class Blamed(NamedTuple):
     """The most likely failure of one kind, per run."""
@@ -103,10 +97,10 @@ def weigh_swaps(
     unseen = watch.limits("unseen")
     rest = ((left / unseen) ** 2).sum(axis=-1)
     better = (np.where(able, difference / unseen, 0.0) ** 2).sum(axis=-1)[of] - rest
-    step = np.broadcast_to(dt / USUAL, mine.shape)[mine]
+    step = np.broadcast_to(dt / watch.thresholds.difference_time, mine.shape)[mine]
     after = lagbank.follow(evidence[mine], better, step)
     evidence = evidence.copy()
-    evidence[mine] = np.where(after > -AGAINST * n, after, -np.inf)
+    evidence[mine] = np.where(after > -watch.thresholds.swap_evidence * n, after, -np.inf)
     if not find:
         return evidence, _nobody(able)
     rests, worst = np.full(mine.shape, np.inf), np.full(mine.shape, np.inf)

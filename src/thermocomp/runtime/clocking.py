@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from thermocomp.core.correction import Limits
 from thermocomp.core.reading import Reading
-from thermocomp.runtime.gate import CLOCK_SKEW, explain_untimely
+from thermocomp.core.thresholds import Thresholds
+from thermocomp.runtime.gate import explain_untimely
 from thermocomp.runtime.state import CompensatorState, silence
 
 
@@ -21,7 +22,9 @@ class Instant(NamedTuple):
     origin: float  #: new origin of the state [s]
 
 
-def place(state: CompensatorState, reading: Reading, now: float, tick: float, limits: Limits) -> tuple[Instant, str]:
+def place(
+    state: CompensatorState, reading: Reading, now: float, tick: float, limits: Limits, thresholds: Thresholds
+) -> tuple[Instant, str]:
     """Return the time of a reading, and the reason if it is invalid (empty if valid).
 
     Parameters
@@ -31,7 +34,7 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
     tick : float
         Present time of the monotonic clock of the process [s].
     """
-    if why := explain_untimely(reading, now, limits):
+    if why := explain_untimely(reading, now, limits, thresholds):
         return Instant(math.nan, state.origin), why
     if state.time is None:
         return Instant(reading.time, 0.0), ""
@@ -40,7 +43,7 @@ def place(state: CompensatorState, reading: Reading, now: float, tick: float, li
         return _set(state, reading, passed), ""
     time, last = reading.time - state.origin, state.time + state.origin
     back = time <= state.time
-    if back and (last <= now + CLOCK_SKEW or passed <= 0.0):
+    if back and (last <= now + thresholds.clock_skew or passed <= 0.0):
         why = f"reading at {reading.time:g} s is not later than the previous reading at {last:g} s"
         return Instant(math.nan, state.origin), why
     if back or abs(time - state.time - passed) > limits.reading_age:  # the clock was set

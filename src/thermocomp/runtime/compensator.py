@@ -24,6 +24,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.state import State
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Probing
@@ -78,6 +79,11 @@ class Compensator:
         return tuple(found)
 
     @cached_property
+    def thresholds(self) -> Thresholds:
+        """Thresholds of all models."""
+        return self.models[0].thresholds if self.models else THRESHOLDS
+
+    @cached_property
     def _lookouts(self) -> tuple[Lookout, ...]:
         return tuple(Lookout(w) for w in self.watches)
 
@@ -99,6 +105,8 @@ class Compensator:
         return found
 
     def __post_init__(self) -> None:
+        if any(m.thresholds != self.thresholds for m in self.models):
+            raise InputError("the models have different thresholds; fit them with the same version of thermocomp")
         if self.shadow and len(self.shadow) == len(self.lines) and not self.watching:
             raise InputError(next(iter(self.shadow.values())).reason)
 
@@ -196,11 +204,11 @@ class Compensator:
         """Return the reason why a reading must not be used, regardless of its time; empty if it may be used.
 
         A temperature is plausible within its trained range widened on either side by the span of that range. For the
-        first readings, which determine the zero, the median of the temperatures must lie within `DAY` of the zero of
-        the training, and the offset of each temperature from the others may differ from that in the training by at most
-        its trained span or `MIN_SPAN`, whichever is greater. Quantities without physical bounds (a displacement, a
-        dimensionless number) may take values in their trained range widened by `WIDE` times its width. The constants
-        are defined in `thermocomp.runtime.gate`.
+        first readings, which determine the zero, the median of the temperatures must lie within `zero_change` of the
+        zero of the training, and the offset of each temperature from the others may differ from that in the training by
+        at most its trained span or `least_margin`, whichever is greater. Quantities without physical bounds (a
+        displacement, a dimensionless number) may take values in their trained range widened by `margin` times its
+        width: see `thermocomp.core.thresholds.Thresholds`.
         """
         for group in self.groups:
             values = group.ranges.pick(reading.values)
@@ -230,7 +238,7 @@ class Compensator:
             clock is set back, corrections wait until it has reached its previous time.
         """
         (fresh, known_before), tick = sift(state, probings), now if tick is None else tick
-        instant, untimely = place(state, reading, now, tick, self.limits)
+        instant, untimely = place(state, reading, now, tick, self.limits, self.thresholds)
         if not untimely:
             state, reading = self._believe(state, reading, instant.time)
         if why := untimely or self.gate(state, reading):
@@ -252,7 +260,7 @@ class Compensator:
             idle=left.idle,
             averaged=stepped.averaged,
             learned=done.learned,
-            probed=remember(state, probed, instant.time) if probed else state.probed,
+            probed=remember(state, probed, instant.time, self.thresholds.resumable) if probed else state.probed,
             references=done.references,
             raw=done.raw,
             away=None if done.arrived else state.away,
@@ -310,7 +318,9 @@ class Compensator:
                 done.learned[target] = answer.learned
             if probing is not None:
                 done.refused[target], done.moved[target] = answer.refused, answer.moved
-            correction, status = drive(state, target, line, answer.deviation, travel, self.limits)
+            correction, status = drive(
+                state, target, line, answer.deviation, travel, self.limits, self.thresholds.caught_up
+            )
             done.corrections[target], done.states[target] = correction, status
             done.arrived &= status.word != "restarting"
         return done

@@ -11,9 +11,6 @@ from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine
 from thermocomp.runtime.state import CompensatorState, Reference, Status
 
-#: after a restart, a correction has caught up once it differs by no more than this from the output of its models [um]
-ARRIVED = 0.1
-
 ACTIVE = Status("active")
 
 
@@ -63,9 +60,23 @@ def travel_time(state: CompensatorState, tick: float, limits: Limits) -> float:
 
 
 def drive(
-    state: CompensatorState, target: str, line: DeviationLine, deviation: Deviation, travel: float, limits: Limits
+    state: CompensatorState,
+    target: str,
+    line: DeviationLine,
+    deviation: Deviation,
+    travel: float,
+    limits: Limits,
+    near: float,
 ) -> tuple[Correction, Status]:
-    """Return the correction for a deviation, within the limits, and the status of the target."""
+    """Return the correction for a deviation, within the limits, and the status of the target.
+
+    Parameters
+    ----------
+    travel : float
+        Time that counts for the movement [s].
+    near : float
+        See `Thresholds.caught_up` [um].
+    """
     before, order = state.corrections[target], state.orders.get(target)
     wanted = Correction.opposing(deviation)
     if order is not None and order.word in ("holding", "suspended"):
@@ -73,7 +84,7 @@ def drive(
     if order is not None:  # shadow
         return limit_line(Correction(0.0), before, line.travel, travel, replace(limits, dead_band=0.0)), order
     after = limit_line(wanted, before, line.travel, travel, limits)
-    if state.away is not None and _apart(wanted, after, line.travel) > max(ARRIVED, limits.dead_band):
+    if state.away is not None and _apart(wanted, after, line.travel) > max(near, limits.dead_band):
         return after, Status(
             "restarting", f"compensation did not run for {state.away:.0f} s; measure with the probe, or re-zero"
         )

@@ -70,7 +70,10 @@ class Fleet:
                 "remove NaN and infinity"
             )
         n, kind = len(zero), self.dtype
-        ranges = [[find_plausible_range(i, z) for z in column] for i, column in zip(model.inputs, zero.T, strict=True)]
+        ranges = [
+            [find_plausible_range(i, z, model.thresholds) for z in column]
+            for i, column in zip(model.inputs, zero.T, strict=True)
+        ]
         bounds = np.array(ranges).reshape(len(model.inputs), n, 2)
         self._low, self._high = (np.ascontiguousarray(bounds[:, :, k], dtype=kind) for k in (0, 1))
         self._zero = np.ascontiguousarray(zero.T, dtype=kind)

@@ -18,24 +18,10 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
-
-#: possible values of each quantity: a value outside indicates a sensor failure
-PLAUSIBLE: dict[str, tuple[float, float]] = {
-    "temperature": (-40.0, 150.0),  # degC
-    "spindle_speed": (-500_000.0, 500_000.0),  # 1/min
-    "position": (-100_000.0, 100_000.0),  # mm
-}
+from thermocomp.core.thresholds import Thresholds
 
 #: any finite number
 ANY = (-sys.float_info.max, sys.float_info.max)
-#: maximum difference of the present zero from the zero of the training [degC]
-DAY = 15.0
-#: minimum margin outside the trained range of a temperature [degC]
-MIN_SPAN = 10.0
-#: margin outside the trained range of quantities without physical bounds (a displacement, a number), in range widths
-WIDE = 10.0
-#: maximum time by which the stamp of a reading may be ahead of the clock [s]
-CLOCK_SKEW = 1.0
 
 
 def explain_implausible(model: ErrorModel, values: Sequence[object], reference: Sequence[float]) -> str:
@@ -52,29 +38,29 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
     for channel, value, zero in zip(model.inputs, values, reference, strict=True):
         if value is None:
             return f"{channel.name} is missing"
-        low, high = find_plausible_range(channel, zero)
+        low, high = find_plausible_range(channel, zero, model.thresholds)
         # a plain float needs no further check: comparisons with nan fail, as do those of infinity with finite bounds
         if not ((type(value) is float or is_number(value)) and low <= value <= high):  # type: ignore[operator]
             return f"{channel.name} = {value} {channel.unit} is not plausible"
         if math.isnan(zero) and channel.quantity == "temperature":
             undecided.append((channel, float(value) - channel.reference))  # type: ignore[arg-type]
-    return _no_start(undecided) if undecided else ""
+    return _no_start(undecided, model.thresholds) if undecided else ""
 
 
-def _no_start(offsets: Sequence[tuple[Input, float]]) -> str:
+def _no_start(offsets: Sequence[tuple[Input, float]], thresholds: Thresholds) -> str:
     """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
     middle = median(offset for _, offset in offsets)
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
-        if abs(middle) > DAY:
+        if abs(middle) > thresholds.zero_change:
             return f"{start}: the machine differs by {middle:+.1f} degC from the zero of the training data"
-        if abs(offset - middle) > max(channel.high - channel.low, MIN_SPAN):
+        if abs(offset - middle) > max(channel.high - channel.low, thresholds.least_margin):
             apart = f"{offset - middle:+.1f} degC from the others"
             return f"{start}: relative to the zero of the training data, it differs by {apart}"
     return ""
 
 
-def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
+def explain_untimely(reading: Reading, now: float, limits: Limits, thresholds: Thresholds) -> str:
     """Return the reason why the time stamp of a reading is invalid; empty if it is valid.
 
     Parameters
@@ -87,25 +73,25 @@ def explain_untimely(reading: Reading, now: float, limits: Limits) -> str:
         return f"reading contains {type(values).__name__} instead of a mapping of values by channel"
     if not (is_number(reading.time) and is_number(now)):
         return f"time {reading.time} or clock {now} is not a number"
-    if reading.time > now + CLOCK_SKEW:
+    if reading.time > now + thresholds.clock_skew:
         return f"reading is {reading.time - now:.1f} s ahead of the clock"
     if now - reading.time > limits.reading_age:
         return f"reading is {now - reading.time:.1f} s old; at most {limits.reading_age:g} s are allowed"
     return ""
 
 
-def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
+def find_plausible_range(channel: Input, zero: float, thresholds: Thresholds) -> tuple[float, float]:
     """Return the range outside which a value indicates a broken sensor instead of a warm machine.
 
     `zero` is the present zero of the channel; nan while unknown.
     """
-    low, high = PLAUSIBLE.get(channel.quantity, ANY)
+    low, high = thresholds.plausible.get(channel.quantity, ANY)
     if channel.quantity == "temperature" and not math.isnan(zero):
-        span = max(channel.high - channel.low, MIN_SPAN)
+        span = max(channel.high - channel.low, thresholds.least_margin)
         low, high = max(low, zero + channel.low - span), min(high, zero + channel.high + span)
-    elif channel.quantity not in PLAUSIBLE:
+    elif channel.quantity not in thresholds.plausible:
         around = channel.reference if math.isnan(zero) else zero
-        room = WIDE * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
+        room = thresholds.margin * max(channel.high - channel.low, abs(channel.low), abs(channel.high), 1.0)
         low, high = max(low, around + channel.low - room), min(high, around + channel.high + room)
     return low, high
 
@@ -113,8 +99,8 @@ def find_plausible_range(channel: Input, zero: float) -> tuple[float, float]:
 class Ranges:
     """Plausible ranges of several inputs, computed once per zero: fast path of `explain_implausible`."""
 
-    def __init__(self, inputs: Sequence[Input]) -> None:
-        self._inputs = tuple(inputs)
+    def __init__(self, inputs: Sequence[Input], thresholds: Thresholds) -> None:
+        self._inputs, self._thresholds = tuple(inputs), thresholds
         self.names = tuple(i.name for i in inputs)
         several = len(self.names) > 1  # with one name, `itemgetter` returns no tuple
         self._all: Callable[[Mapping[str, object]], Sequence[object]] = (
@@ -141,7 +127,8 @@ class Ranges:
         """
         known, ranges = self._of
         if known is not reference:
-            ranges = [find_plausible_range(i, z) for i, z in zip(self._inputs, reference.tolist(), strict=True)]
+            of = zip(self._inputs, reference.tolist(), strict=True)
+            ranges = [find_plausible_range(i, z, self._thresholds) for i, z in of]
             ranges = [] if np.isnan(reference).any() else ranges
             self._of = (reference, ranges)
         if not ranges:

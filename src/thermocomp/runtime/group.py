@@ -32,7 +32,7 @@ class Group:
         self.models = tuple(models[k] for k in members)
         self.lead = self.models[0]
         self._joint = _Joint(self.models) if len(self.models) > 1 else None
-        self.ranges = Ranges(self.lead.inputs)
+        self.ranges = Ranges(self.lead.inputs, self.lead.thresholds)
         self._apart = list(dict.fromkeys(m.joint for m in self.models if m.joint is not None))
 
     @staticmethod
@@ -114,7 +114,7 @@ class _Joint:
             spread = said[self._n :] ** 2 @ self._sum
             factor: FloatArray = np.maximum(self._running, self._stopped)
             if lead.band.speeds:
-                factor = self._running if lead.band.turning(change) else self._stopped
+                factor = self._running if lead.band.turning(change, lead.thresholds.stopped_speed) else self._stopped
             widths = factor * np.sqrt(self._floor + spread)
         found = [State(reference, memory, d, outside) for d in deviations]
         return found, deviations.tolist(), widths.tolist()

@@ -1,13 +1,15 @@
 """Identity of probings: a probing that is delivered twice counts once.
 
 A broker may repeat an unconfirmed message, and a program may repeat a command. A probing is identical to an earlier one
-if it has the same id or the same time or, if it has neither, the same content. It is remembered for a day.
+if it has the same id or the same time or, if it has neither, the same content. It is remembered for a day
+(`Thresholds.resumable`).
 """
 
 from collections.abc import Mapping
 
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.runtime.adaptation import Probing
-from thermocomp.runtime.state import FORGOTTEN, CompensatorState
+from thermocomp.runtime.state import CompensatorState
 
 #: maximum number of keys remembered for each target
 MOST_KEYS = 600
@@ -26,17 +28,21 @@ def sift(state: CompensatorState, probings: Mapping[str, Probing] | None) -> tup
     return fresh, {t: KNOWN for t in given if t not in fresh}
 
 
-def remember(state: CompensatorState, probings: Mapping[str, Probing], time: float) -> dict[str, dict[str, float]]:
+def remember(
+    state: CompensatorState, probings: Mapping[str, Probing], time: float, memory: float = THRESHOLDS.resumable
+) -> dict[str, dict[str, float]]:
     """Return the first arrival times of all remembered keys, including those of new probings, by target or axis.
 
     Parameters
     ----------
     time : float
         Present time of the state [s].
+    memory : float
+        Time for which a key is remembered [s].
     """
     found = dict(state.probed)
     for target, probing in probings.items():
-        known = {k: t for k, t in found.get(target, {}).items() if time - t <= FORGOTTEN}
+        known = {k: t for k, t in found.get(target, {}).items() if time - t <= memory}
         known |= dict.fromkeys(probing.identity, time)
         found[target] = dict(list(known.items())[-MOST_KEYS:])
     return found

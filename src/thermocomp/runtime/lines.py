@@ -74,6 +74,7 @@ def evaluate(
         Largest permitted correction [um]; no probing changes the deviation by more.
     """
     first, end = line.models.start, line.models.stop
+    thresholds = models[first].thresholds
     raw, refused, moved, single = line.deviation(spoken.said[first:end]), "", 0.0, end == first + 1
     deviation = raw.less(zero) if zero.offset or zero.slope else raw
     width, band = math.nan, models[first].band if single else None
@@ -84,17 +85,19 @@ def evaluate(
     directions = models[first].directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
-        wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions)))
+        wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions, thresholds)))
         if band is not None:
-            width *= float(learned.narrowing(time, directions, band.floor))
+            width *= float(learned.narrowing(time, directions, band.floor, thresholds))
     if probing is not None:
         error = probing.deviation - deviation.at(probing.position)
         own = models[line.models]
         size, typical, drift = (_mean_square(line, own, name) for name in ("rms", "typical", "none_rms"))
-        most = adaptation.find_most(size, drift, magnitude)
-        before = (learned or adaptation.begin(size, len(directions), typical))._replace(most=most)
-        learned, refused = adaptation.take(before, directions, time, error, probing.repeatability)
-        moved = float(learned.shift(time, directions) - before.shift(time, directions))
+        most = adaptation.find_most(size, drift, magnitude, thresholds)
+        before = (learned or adaptation.begin(size, len(directions), typical, thresholds=thresholds))._replace(
+            most=most
+        )
+        learned, refused = adaptation.take(before, directions, time, error, probing.repeatability, thresholds)
+        moved = float(learned.shift(time, directions, thresholds) - before.shift(time, directions, thresholds))
     return Said(deviation=wanted, half_width=width, learned=learned, refused=refused, moved=moved, raw=raw)
 
 

@@ -15,7 +15,7 @@ class Lookout:
 
     def __init__(self, watch: Watch) -> None:
         self.watch = watch
-        self._ranges = Ranges(watch.inputs)
+        self._ranges = Ranges(watch.inputs, watch.thresholds)
 
     def believe(
         self, state: WatchState, time: float, values: Mapping[str, float]
@@ -28,11 +28,11 @@ class Lookout:
             Time of the reading [s].
         """
         given = self._ranges.pick(values)
-        if is_quiet(state, time) and self._ranges.hold(given, state.reference):
+        if is_quiet(self.watch, state, time) and self._ranges.hold(given, state.reference):
             return state, values
         numbers = np.array([float(v) if is_number(v) else math.nan for v in given])  # type: ignore[arg-type]
         zeroing, watch = self.watch.zeroing, self.watch
-        resting = zeroing.stands(values.get(zeroing.speed))
+        resting = zeroing.stands(values.get(zeroing.speed), watch.thresholds.stopped_speed)
         state, believed = look(watch, state, time, numbers, resting=resting)
         return state, {**values, **dict(zip(watch.names, believed[watch.bank.temperatures].tolist(), strict=True))}
 

@@ -7,14 +7,12 @@ from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.state import State
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting"]
-
-#: maximum age of a state to be resumed; of an older one, only the corrections in force are kept [s]
-FORGOTTEN = 24 * 3600.0
 
 
 class Status(NamedTuple):
@@ -94,10 +92,11 @@ def resume(
     age: float,
     in_force: Mapping[str, Correction] | None = None,
     tick: float | None = None,
+    resumable: float = THRESHOLDS.resumable,
 ) -> CompensatorState:
     """Return the state with which to continue after a restart.
 
-    Up to an age of `FORGOTTEN` the models continue from their memory, as after an outage: their first inputs are
+    Up to the age `resumable` the models continue from their memory, as after an outage: their first inputs are
     assumed to have been constant during the outage. With a greater or unknown age, the compensator starts again. In
     both cases the correction in force is kept and moves from there within the limits.
 
@@ -109,8 +108,10 @@ def resume(
         Present correction as reported by the controller. Default: the saved one.
     tick : float, optional
         Present time of the monotonic clock of the process; time until the first reading is also part of the outage [s].
+    resumable : float
+        See `Thresholds.resumable` [s].
     """
     corrections = {t: (in_force or state.corrections).get(t, c) for t, c in cold.corrections.items()}
-    if not 0.0 <= age <= FORGOTTEN:
+    if not 0.0 <= age <= resumable:
         return cold._replace(corrections=corrections, orders=state.orders, away=age if age >= 0 else math.nan)
     return state._replace(corrections=corrections, clock=None, taken=tick, origin=math.nan, away=age)

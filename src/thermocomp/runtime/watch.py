@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
-from thermocomp.core.watch import FASTER, LASTING, Watch
+from thermocomp.core.watch import Watch
 from thermocomp.core.zero import ZeroMean
-from thermocomp.runtime.blame import USUAL, one_fails, weigh_swaps
-from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
+from thermocomp.runtime.blame import one_fails, weigh_swaps
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -25,19 +24,6 @@ IntArray = NDArray[np.int8]
 #: states of a sensor, by `WatchState.fault`
 WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped")
 GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED = range(len(WORDS))
-
-#: minimum time between two checks of the differences: temperatures are slow [s]
-TICK = 10.0
-#: time for which a missing sensor must agree with its prediction before it is trusted again [s]
-RETURN = 600.0
-#: time constant with which a substitute moves to the prediction [s]
-FADE = 3600.0
-#: waiting time after a failure until its effect on other predictions has faded and a further failure can be found [s]
-REST = 3600.0
-
-
-#: multiple of the fastest trained speed above which no additional heat is assumed
-HEATS = 2.0
 
 
 class WatchState(NamedTuple):
@@ -103,9 +89,9 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
     )
 
 
-def is_quiet(state: WatchState, time: float) -> bool:
+def is_quiet(watch: Watch, state: WatchState, time: float) -> bool:
     """Return whether all sensors are good and no check is due; a plausible reading is then used unchanged."""
-    due = not time - state.time < TICK  # also if the time is unknown
+    due = not time - state.time < watch.thresholds.check_interval  # also if the time is unknown
     return not (due or np.count_nonzero(state.fault) or np.count_nonzero(state.jumped == state.jumped))
 
 
@@ -129,7 +115,7 @@ def look(
     """
     heat = watch.bank.temperatures
     believed = values.copy()
-    fastest = PLAUSIBLE["spindle_speed"][1]  # an impossible speed must not enter the memory
+    fastest = watch.thresholds.most_speed  # an impossible speed must not enter the memory
     if not (np.abs(values.take(watch.speeds, axis=-1)) <= fastest).all():
         return state, believed
     if np.isnan(state.time):
@@ -139,7 +125,7 @@ def look(
     read = values.take(heat, axis=-1)
     x = read - zero
     missing = ~_plausible(watch, x, read)
-    if time - state.time >= TICK:
+    if time - state.time >= watch.thresholds.check_interval:
         state = _step(watch, state, time, np.where(missing, np.nan, x), values)
     if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
         believed[..., heat] = np.where(replaced, zero + state.used, read)
@@ -153,14 +139,15 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
-    span = np.maximum(width, MIN_SPAN)
-    least, most = PLAUSIBLE["temperature"]
+    span = np.maximum(width, watch.thresholds.least_margin)
+    least, most = watch.thresholds.plausible["temperature"]
     with np.errstate(all="ignore"):
         offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
         middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
         day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan is sorted last
         fits = np.abs(offset - day) <= span
-    return np.where(fits, values, zero + np.clip(day, -DAY, DAY))
+    most_day = watch.thresholds.zero_change
+    return np.where(fits, values, zero + np.clip(day, -most_day, most_day))
 
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
@@ -192,16 +179,16 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
 def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
     """Return a mask of the plausible temperatures, by the same rules as the gate of the compensator."""
     low, high, width = watch.ranges
-    span = np.maximum(width, MIN_SPAN)
-    least, most = PLAUSIBLE["temperature"]
+    span = np.maximum(width, watch.thresholds.least_margin)
+    least, most = watch.thresholds.plausible["temperature"]
     within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # False for nan
     return np.asarray(within)
 
 
-def _stand_in(state: WatchState, time: float) -> FloatArray:
+def _stand_in(watch: Watch, state: WatchState, time: float) -> FloatArray:
     """Return the substitute value of each sensor, minus its reference."""
     gone = np.fmax(time - state.since, 0.0)  # 0 if not failed
-    return state.predicted + state.bridge * np.exp(-gone / FADE)
+    return state.predicted + state.bridge * np.exp(-gone / watch.thresholds.substitute_fade)
 
 
 def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
@@ -214,18 +201,20 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     some_failed, waiting = failed.any(), np.isfinite(s.jumped) & ~failed & seen
     used = np.where(waiting, s.usual + s.predicted, x)
     if some_failed:  # every missing sensor among them
-        used = np.where(failed, _stand_in(s, time), used)
+        used = np.where(failed, _stand_in(watch, s, time), used)
     change = _calmed(watch, values - s.reference)
     change[..., watch.bank.temperatures] = used
     memory = watch.bank.advance(s.memory, change, dt)
     direct, weights = watch.read_out
     predicted = used @ direct + memory @ weights
     if some_failed:
-        used = np.where(failed, _stand_in(s._replace(predicted=predicted), time), used)
+        used = np.where(failed, _stand_in(watch, s._replace(predicted=predicted), time), used)
     difference = x - predicted
     calm = ~failed & seen & ~waiting
     inner = np.where(calm, difference, 0.0)
-    usual = np.where(calm, lagbank.follow(s.usual, inner, np.full(inner.shape, dt / USUAL)), s.usual)
+    usual = np.where(
+        calm, lagbank.follow(s.usual, inner, np.full(inner.shape, dt / watch.thresholds.difference_time)), s.usual
+    )
     taus = np.repeat(watch.time_constants, len(watch.sensors))
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
@@ -237,7 +226,7 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
     """Return changes with speeds clipped, so that one reading of 65,535 1/min does not add much heat."""
-    most = HEATS * watch.top_speed
+    most = watch.thresholds.heat_factor * watch.top_speed
     calm = change.copy()
     calm[..., watch.speeds] = np.clip(calm[..., watch.speeds], -most, most)
     return calm
@@ -253,7 +242,7 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
     if not (far.any() or waiting.any()):
         return s, far
     fresh = far & ~waiting
-    lasts = far & waiting & (s.time - s.jumped >= LASTING)
+    lasts = far & waiting & (s.time - s.jumped >= watch.thresholds.fault_duration)
     jumped = np.where(far, np.where(fresh, s.time, s.jumped), np.where(able, np.nan, s.jumped))
     return s._replace(jumped=jumped), lasts
 
@@ -290,7 +279,7 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
     s = s._replace(moving=moving)
     lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all are constant, as with a stopped logger
     long = same & calm & lives & (s.time - s.still > watch.limits("still"))
-    return s, (moves & (s.time - moving >= LASTING)) | long
+    return s, (moves & (s.time - moving >= watch.thresholds.fault_duration)) | long
 
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
@@ -299,10 +288,11 @@ def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray
     if not (np.abs(z) > 1.0).any():
         return s._replace(off=np.full(z.shape, np.nan)), np.zeros(z.shape[:-1], dtype=np.bool_)
     recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
-    beyond = (np.abs(z) > 1.0) & (s.time - recent > REST) & (s.time - s.fast[..., None] > REST)
+    rest = watch.thresholds.fault_rest
+    beyond = (np.abs(z) > 1.0) & (s.time - recent > rest) & (s.time - s.fast[..., None] > rest)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
     with np.errstate(invalid="ignore"):
-        return s._replace(off=off), np.asarray((s.time - off >= LASTING).any(axis=-1))
+        return s._replace(off=off), np.asarray((s.time - off >= watch.thresholds.fault_duration).any(axis=-1))
 
 
 def _blame(
@@ -315,7 +305,7 @@ def _blame(
 ) -> WatchState:
     """Exclude failed sensors: a swapped pair if it explains all residuals better than one failure; else single ones."""
     stepped, stuck, lasting = found
-    counts = np.where(s.time - s.fast[..., None] > REST, dt, 0.0)
+    counts = np.where(s.time - s.fast[..., None] > watch.thresholds.fault_rest, dt, 0.0)
     wrong = lasting | (stepped | stuck).any(axis=-1)
     evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts, find=bool(wrong.any()))
     s = s._replace(evidence=evidence)
@@ -336,7 +326,7 @@ def _blame(
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
     """Return the last time at which the spindle exceeded the trained speeds, where predictions are not validated."""
-    faster = (np.abs(change[..., watch.speeds]) > FASTER * watch.top_speed).any(axis=-1)
+    faster = (np.abs(change[..., watch.speeds]) > watch.thresholds.fast_factor * watch.top_speed).any(axis=-1)
     return np.where(faster, s.time, s.fast)
 
 
@@ -347,7 +337,7 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
         if not fits.any():
             return s._replace(back=np.full(fits.shape, np.nan))
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
-        again = fits & (s.time - back >= RETURN)
+        again = fits & (s.time - back >= watch.thresholds.return_time)
     return s._replace(
         fault=np.where(again, GOOD, s.fault).astype(np.int8),
         since=np.where(again, np.nan, s.since),

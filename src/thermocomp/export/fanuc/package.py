@@ -12,7 +12,6 @@ from thermocomp.export.heidenhain.package import find_marks
 from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, in_um, shorten, vectors
 from thermocomp.export.reduction.reducedpage import write_page
 from thermocomp.export.target import Target
-from thermocomp.runtime.gate import DAY, MIN_SPAN, PLAUSIBLE
 
 SIGN = (
     "Sign: the correction, minus the deviation (actual minus commanded), is added to the external workpiece zero offset"
@@ -164,10 +163,10 @@ def _cap(limits: Limits, option: str, times: float) -> float:
 
 def _plausible(r: Reduced) -> list[tuple[float, float]]:
     """Return the plausible range of each temperature, including changes of the zero from day to day."""
-    least, most = PLAUSIBLE["temperature"]
+    least, most = (fixed := r.model.thresholds).plausible["temperature"]
     found = []
     for (i, _), zero in zip(r.terms, r.zeros, strict=True):
-        room = max(i.high - i.low, MIN_SPAN) + DAY
+        room = max(i.high - i.low, fixed.least_margin) + fixed.zero_change
         found.append((round(max(least, zero + i.low - room), 1), round(min(most, zero + i.high + room), 1)))
     return found
 

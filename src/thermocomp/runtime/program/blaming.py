@@ -1,11 +1,10 @@
 """Sensor failure that explains the residuals of readings, with scalars and loops: see `thermocomp.runtime.blame`."""
 
-from thermocomp.runtime.blame import AGAINST, USUAL
 from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, flag, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, OFF, REST, STEPPED, STUCK, SWAPPED
+from thermocomp.runtime.watch import GOOD, OFF, STEPPED, STUCK, SWAPPED
 
 
 @procedure
@@ -15,7 +14,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         w.able[i] = w.calm[i] | w.waiting[i]
         with when(~w.able[i]):
             w.x[i] = s.used[i]
-    weigh_swaps(s, w, t, choose(~s.was_fast | (w.now - s.fast > REST), elapsed, 0.0))
+    weigh_swaps(s, w, t, choose(~s.was_fast | (w.now - s.fast > t.fault_rest), elapsed, 0.0))
     alone = let("alone", flag(False))
     for i in each("i", t.SENSORS):
         with when(w.stepped[i] | w.stuck[i]):
@@ -131,12 +130,12 @@ def weigh_swaps(s: Kept, w: Work, t: Constants, counts: Number) -> None:
                     rest.set(rest + left / t.unseen[i] * (left / t.unseen[i]))
                     worst.set(larger(worst, abs(left / t.off_limit[i])))
             with when(w.able[a] & w.able[b]):
-                s.evidence[p] = follow(s.evidence[p], whole - rest, counts / USUAL)
+                s.evidence[p] = follow(s.evidence[p], whole - rest, counts / t.difference_time)
                 with when((w.both < 0) | (rest < w.both_rest)):
                     w.both = p
                     w.both_rest = rest
                     w.both_worst = worst
-            s.cleared[p] = ~(s.evidence[p] > -AGAINST * t.SENSORS.real)
+            s.cleared[p] = ~(s.evidence[p] > -t.swap_evidence * t.SENSORS.real)
 
 
 @procedure

@@ -7,8 +7,6 @@ numbers only.
 """
 
 from thermocomp.core.bounds import GAP
-from thermocomp.core.zero import STANDS
-from thermocomp.runtime.gate import CLOCK_SKEW, DAY
 from thermocomp.runtime.program import watching
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
@@ -38,7 +36,7 @@ def step(s: Kept, w: Work, t: Constants) -> None:
         w.given[c] = (w.value[c] >= -1e30) & (w.value[c] <= 1e30)  # False for NaN
     w.stands = False
     with when(t.has_speed):
-        w.stands = w.given[t.speed_channel] & (abs(w.value[t.speed_channel]) <= STANDS)
+        w.stands = w.given[t.speed_channel] & (abs(w.value[t.speed_channel]) <= t.stopped_speed)
     with when(t.watched), when(w.passes):
         watching.believe(s, w, t)
     with when(w.passes):
@@ -71,7 +69,7 @@ def tell_time(s: Kept, w: Work, t: Constants) -> None:
         w.travel = s.clock - w.travel
         with when(w.travel > t.reading_age):
             w.travel = t.reading_age
-    w.passes = w.passes & (w.age >= -CLOCK_SKEW) & (w.age <= t.reading_age)
+    w.passes = w.passes & (w.age >= -t.clock_skew) & (w.age <= t.reading_age)
     w.now = s.clock - s.origin
     w.shifted = s.origin
     with when(w.passes):
@@ -120,7 +118,7 @@ def check_start(s: Kept, w: Work, t: Constants, g: Whole) -> None:
             r.set(t.set_range[m])
             with when(t.temperature[r] & t.rezero[r]):
                 off = let("off", w.value[t.channel[r]] - t.reference[r])
-                with when((abs(w.middle) > DAY) | (abs(off - w.middle) > t.span[r])):
+                with when((abs(w.middle) > t.zero_change) | (abs(off - w.middle) > t.span[r])):
                     w.passes = False
                     s.rejected = NO_START
 

@@ -10,14 +10,31 @@ from thermocomp.core.expression import Clip, Node
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.gate import MIN_SPAN, PLAUSIBLE, WIDE
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
+#: thresholds that only the watch needs, and those it has in common with the gate
+OF_WATCH = (
+    "least_temperature",
+    "most_temperature",
+    "most_speed",
+    "zero_change",
+    "stopped_speed",
+    "check_interval",
+    "fault_duration",
+    "return_time",
+    "substitute_fade",
+    "fault_rest",
+    "heat_factor",
+    "fast_factor",
+    "difference_time",
+    "swap_evidence",
+)
 
 
 class Tables(NamedTuple):
@@ -62,13 +79,14 @@ def gather(compensator: Compensator) -> Tables:
     place = {c.name: k for k, c in enumerate(channels)}
     sets = list(dict.fromkeys(m.inputs for m in models))
     sensors = watch.names if watch else ()
-    limits, lines = compensator.limits, compensator.lines
+    limits, lines, thresholds = compensator.limits, compensator.lines, compensator.thresholds
     values: dict[str, Any] = {
         **{name: getattr(limits, name) for name in ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")},
         "at_rest": zeroing.at_rest,
         "otherwise": zeroing.otherwise,
         "speed_channel": place.get(zeroing.speed, 0),
-        **_ranges(ranges, models, place),
+        **{name: getattr(thresholds, name) for name in ("stopped_speed", "clock_skew", "zero_change")},
+        **_ranges(ranges, models, place, thresholds),
         "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
         "set_range": [ranges.index(i) for s in sets for i in s],
         "model_rezeroed": [any(i.rezero for i in m.inputs) for m in models],
@@ -134,11 +152,14 @@ def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
     return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
 
 
-def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: dict[str, int]) -> dict[str, Any]:
-    limits = [PLAUSIBLE.get(r.quantity, ANY) for r in ranges]
+def _ranges(
+    ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: dict[str, int], thresholds: Thresholds
+) -> dict[str, Any]:
+    plausible = thresholds.plausible
+    limits = [plausible.get(r.quantity, ANY) for r in ranges]
     heat = [r.quantity == "temperature" for r in ranges]
-    span = [max(r.high - r.low, MIN_SPAN) for r in ranges]
-    wide = [WIDE * max(r.high - r.low, abs(r.low), abs(r.high), 1.0) for r in ranges]
+    span = [max(r.high - r.low, thresholds.least_margin) for r in ranges]
+    wide = [thresholds.margin * max(r.high - r.low, abs(r.low), abs(r.high), 1.0) for r in ranges]
     bounds: dict[Input, list[tuple[float, float]]] = {r: [] for r in ranges}
     for m in models:
         low, high, _ = m.bounds
@@ -153,7 +174,7 @@ def _ranges(ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: di
         "low": [r.low for r in ranges],
         "high": [r.high for r in ranges],
         "room": [s if h else w for h, s, w in zip(heat, span, wide, strict=True)],
-        "applies": [1 if h else 0 if r.quantity in PLAUSIBLE else 2 for h, r in zip(heat, ranges, strict=True)],
+        "applies": [1 if h else 0 if r.quantity in plausible else 2 for h, r in zip(heat, ranges, strict=True)],
         "least": [low for low, _ in limits],
         "most": [high for _, high in limits],
         "span": span,
@@ -251,12 +272,13 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "watch_rezero": [i.rezero for i in watch.inputs],
         "watch_reference": [i.reference for i in watch.inputs],
         "start_zero": [i.reference if i.rezero else i.reference + i.low for i in heat],
-        "start_span": [max(w, MIN_SPAN) for w in width],
+        "start_span": [max(w, watch.thresholds.least_margin) for w in width],
         "sensor_low": low,
         "sensor_high": high,
-        "sensor_span": [max(w, MIN_SPAN) for w in width],
+        "sensor_span": [max(w, watch.thresholds.least_margin) for w in width],
         "speed_input": watch.speeds.tolist(),
         "top_speed": watch.top_speed,
+        **{name: getattr(watch.thresholds, name) for name in OF_WATCH},
         "pace": watch.pace,
         "tau": list(watch.time_constants),
         "state_input": bank.speeds.tolist(),

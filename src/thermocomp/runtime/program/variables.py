@@ -1,5 +1,6 @@
 """Persistent variables, working memory and constants of the program of a compensator."""
 
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.runtime.program.declarations import (
     Record,
     number,
@@ -146,6 +147,12 @@ class Work(Record):
     both_worst = number("largest residual with that swap")
 
 
+def threshold(name: str, *, time: bool = False) -> number:
+    """Return the declaration of a threshold: see `thermocomp.core.thresholds`."""
+    row = next(r for r in THRESHOLDS.rows if r.name == name)
+    return number(row.reason + (f" [{row.unit}]" if row.unit else ""), time=time)
+
+
 class Constants(Record):
     """Constants: numbers of the models and of the limits, and sizes."""
 
@@ -159,6 +166,9 @@ class Constants(Record):
     fade = number("time constant of the decay of the correction after the hold time [s]", time=True)
     at_rest = number("averaging time of the zero with the spindle stopped [s]", time=True)
     otherwise = number("averaging time of the zero otherwise [s]", time=True)
+    stopped_speed = threshold("stopped_speed")
+    clock_skew = threshold("clock_skew", time=True)
+    zero_change = threshold("zero_change")
     speed_channel = whole("channel that shows whether the spindle is stopped")
     channel = wholes("channel of each trained range", "RANGES")
     temperature = truths("the input is a temperature", "RANGES")
@@ -223,6 +233,18 @@ class Constants(Record):
     speed_input = wholes("input of the watch", "SPEEDS")
     top_speed = number("largest trained speed [1/min]")
     pace = number("time within which a change is a jump [s]", time=True)
+    least_temperature = threshold("least_temperature")
+    most_temperature = threshold("most_temperature")
+    most_speed = threshold("most_speed")
+    check_interval = threshold("check_interval", time=True)
+    fault_duration = threshold("fault_duration", time=True)
+    return_time = threshold("return_time", time=True)
+    substitute_fade = threshold("substitute_fade", time=True)
+    fault_rest = threshold("fault_rest", time=True)
+    heat_factor = threshold("heat_factor")
+    fast_factor = threshold("fast_factor")
+    difference_time = threshold("difference_time", time=True)
+    swap_evidence = threshold("swap_evidence")
     tau = numbers("time constants of the lags [s]", "TAUS")
     state_input = wholes("speed followed by a state", "STATES")
     power = numbers("exponent of the fraction of top speed", "STATES")

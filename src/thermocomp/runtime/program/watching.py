@@ -1,8 +1,5 @@
 """Monitoring of the temperatures with scalars and loops only: see `thermocomp.runtime.watch` for explanations."""
 
-from thermocomp.core.watch import FASTER, LASTING
-from thermocomp.runtime.blame import USUAL
-from thermocomp.runtime.gate import DAY, PLAUSIBLE
 from thermocomp.runtime.program import blaming
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.language import (
@@ -17,12 +14,10 @@ from thermocomp.runtime.program.language import (
     when,
 )
 from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
-from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
+from thermocomp.runtime.program.values import Number, Whole, flag, integer
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import FADE, GOOD, HEATS, MISSING, REST, RETURN, TICK
+from thermocomp.runtime.watch import GOOD, MISSING
 
-COLDEST, HOTTEST = PLAUSIBLE["temperature"]
-FASTEST = PLAUSIBLE["spindle_speed"][1]
 HOLDING = 2
 
 
@@ -32,7 +27,7 @@ def believe(s: Kept, w: Work, t: Constants) -> None:
     w.made = True
     for k in each("k", t.SPEEDS):
         c = let("c", t.watch_channel[t.speed_input[k]])
-        with when(~(w.given[c] & (abs(w.value[c]) <= FASTEST))):
+        with when(~(w.given[c] & (abs(w.value[c]) <= t.most_speed))):
             w.made = False
     with when(w.made & ~s.looked):
         make_up(s, w, t)
@@ -42,12 +37,12 @@ def believe(s: Kept, w: Work, t: Constants) -> None:
             c.set(t.sensor_channel[i])
             w.there[i] = False
             w.x[i] = 0.0
-            with when(w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST)):
+            with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
                 w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[i]]
                 w.there[i] = (w.x[i] >= t.sensor_low[i] - t.sensor_span[i]) & (
                     w.x[i] <= t.sensor_high[i] + t.sensor_span[i]
                 )
-        with when(w.now - s.look >= TICK):
+        with when(w.now - s.look >= t.check_interval):
             look(s, w, t)
         for i in each("i", t.SENSORS):
             with when(s.fault[i].differs(GOOD) | ~w.there[i] | s.has_jumped[i]):
@@ -61,7 +56,7 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
     w.rows = 0
     for i in each("i", t.SENSORS):
         c = let("c", t.sensor_channel[i])
-        with when(w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST)):
+        with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
             w.column[w.rows] = w.value[c] - t.start_zero[i]
             w.rows = w.rows + 1
     w.middle = 0.0
@@ -70,10 +65,10 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
         w.middle = w.column[(w.rows - 1) // 2]
     for i in each("i", t.SENSORS):
         c.set(t.sensor_channel[i])
-        fits = let("fits", w.given[c] & (w.value[c] >= COLDEST) & (w.value[c] <= HOTTEST))
+        fits = let("fits", w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature))
         fits.set(fits & (abs(w.value[c] - t.start_zero[i] - w.middle) <= t.start_span[i]))
         with when(~fits):
-            w.value[c] = t.start_zero[i] + larger(real(-DAY), smaller(real(DAY), w.middle))
+            w.value[c] = t.start_zero[i] + larger(-t.zero_change, smaller(t.zero_change, w.middle))
             w.given[c] = True
 
 
@@ -112,7 +107,7 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
 def calm_down(s: Kept, w: Work, t: Constants) -> None:
     """Limit speeds to a multiple of the top speed."""
     for k in each("k", t.SPEEDS):
-        most = let("most", HEATS * t.top_speed)
+        most = let("most", t.heat_factor * t.top_speed)
         w.change[t.speed_input[k]] = larger(-most, smaller(most, w.change[t.speed_input[k]]))
 
 
@@ -144,18 +139,18 @@ def look(s: Kept, w: Work, t: Constants) -> None:
     for i in each("i", t.SENSORS):
         s.used[i] = w.x[i]
         with when(s.fault[i].differs(GOOD)):
-            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / FADE)
+            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / t.substitute_fade)
         with otherwise_when(w.waiting[i]):
             s.used[i] = s.usual[i] + s.predicted[i]
     advance(s, w, t, elapsed)
     predict(s, w, t)
     for i in each("i", t.SENSORS):
         with when(s.fault[i].differs(GOOD)):
-            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / FADE)
+            s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / t.substitute_fade)
         w.difference[i] = w.x[i] - s.predicted[i]
         w.calm[i] = s.fault[i].equals(GOOD) & w.there[i] & ~w.waiting[i]
         with when(w.calm[i]):
-            s.usual[i] = follow(s.usual[i], w.difference[i], elapsed / USUAL)
+            s.usual[i] = follow(s.usual[i], w.difference[i], elapsed / t.difference_time)
     for k in each("k", t.TAUS):
         for i in each("i", t.SENSORS):
             inner = let("inner", choose(w.calm[i], w.difference[i], 0.0))
@@ -180,7 +175,7 @@ def find_jumps(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             with when(~w.far[i]):
                 s.has_jumped[i] = False
             with otherwise_when(s.has_jumped[i]):
-                w.stepped[i] = w.now - s.jumped[i] >= LASTING
+                w.stepped[i] = w.now - s.jumped[i] >= t.fault_duration
             with otherwise():
                 s.has_jumped[i] = True
                 s.jumped[i] = w.now
@@ -200,7 +195,7 @@ def advance(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         quick = let("quick", t.resting_rate[k] + share * t.gain[k])
         s.memory[t.LAGGED + k] = follow(s.memory[t.LAGGED + k], raised(share, t.power[k]), elapsed * quick)
     for k in each("k", t.SPEEDS):
-        with when(abs(w.change[t.speed_input[k]]) > FASTER * t.top_speed):
+        with when(abs(w.change[t.speed_input[k]]) > t.fast_factor * t.top_speed):
             s.was_fast = True
             s.fast = w.now
 
@@ -224,7 +219,7 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
         with when(moves & ~s.is_moving[i]):
             s.moving[i] = w.now
         s.is_moving[i] = moves
-        w.stuck[i] = moves & (w.now - s.moving[i] >= LASTING)
+        w.stuck[i] = moves & (w.now - s.moving[i] >= t.fault_duration)
         with when(~w.changed[i] & w.calm[i] & lives & (w.now - s.still[i] > t.still_limit[i])):
             w.stuck[i] = True
 
@@ -232,9 +227,9 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
 @procedure
 def find_off(s: Kept, w: Work, t: Constants) -> None:
     """Find sensors whose difference from the prediction has been too large for too long."""
-    rested = let("rested", ~s.was_fast | (w.now - s.fast > REST))
+    rested = let("rested", ~s.was_fast | (w.now - s.fast > t.fault_rest))
     for i in each("i", t.SENSORS):
-        with when((s.fault[i] > MISSING) & (w.now - s.since[i] <= REST)):
+        with when((s.fault[i] > MISSING) & (w.now - s.since[i] <= t.fault_rest)):
             rested.set(False)
     w.lasting = False
     for i in each("i", t.SENSORS):
@@ -242,7 +237,7 @@ def find_off(s: Kept, w: Work, t: Constants) -> None:
         with when(beyond & ~s.is_off[i]):
             s.off_since[i] = w.now
         s.is_off[i] = beyond
-        with when(beyond & (w.now - s.off_since[i] >= LASTING)):
+        with when(beyond & (w.now - s.off_since[i] >= t.fault_duration)):
             w.lasting = True
 
 
@@ -254,7 +249,7 @@ def believe_again(s: Kept, w: Work, t: Constants) -> None:
         with when(fits & ~s.is_back[i]):
             s.back[i] = w.now
         s.is_back[i] = fits
-        with when(fits & (w.now - s.back[i] >= RETURN)):
+        with when(fits & (w.now - s.back[i] >= t.return_time)):
             s.fault[i] = GOOD
             s.usual[i] = w.difference[i]
             s.used[i] = s.predicted[i] + w.difference[i]

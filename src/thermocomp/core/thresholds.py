@@ -1,0 +1,158 @@
+"""`Thresholds`: fixed numbers by which the compensator decides, each with unit, reason and source; part of every model.
+
+A model is judged with these numbers, so it keeps them: they are stored in its file, and a later version of this package
+that uses other numbers for new models still runs the model with its own.
+"""
+
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+from thermocomp.core.bounds import GAP, LEAST, RANGE, check_between, check_finite
+from thermocomp.core.exceptions import SettingError
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """A threshold with its unit, the reason for its value, and the source of the value."""
+
+    name: str
+    value: float
+    unit: str
+    reason: str
+    source: str
+
+
+def _fixed(value: float, unit: str, reason: str, source: str) -> float:
+    found: float = field(default=value, metadata={"unit": unit, "reason": reason, "source": source})
+    return found
+
+
+_START, _WATCH, _PROBING, _OWN = "decision 0021", "decision 0030", "decision 0031", "choice of this project"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """Fixed numbers of gate, watch, adaptation and restart; `rows` returns them with unit, reason and source.
+
+    Raises
+    ------
+    SettingError
+        A number is not finite or not positive, or two numbers contradict each other.
+    """
+
+    # plausible readings
+    least_temperature: float = _fixed(-40.0, "degC", "colder readings indicate a broken sensor", _OWN)
+    most_temperature: float = _fixed(150.0, "degC", "warmer readings indicate a broken sensor", _OWN)
+    most_speed: float = _fixed(500_000.0, "1/min", "no spindle turns faster", _OWN)
+    most_position: float = _fixed(100_000.0, "mm", "no axis is longer", _OWN)
+    zero_change: float = _fixed(
+        15.0, "degC", "a zero that differs more from that of the training belongs to no known day", _START
+    )
+    least_margin: float = _fixed(
+        10.0, "degC", "margin outside the trained range of a temperature, if that range is smaller", _START
+    )
+    margin: float = _fixed(
+        10.0, "range widths", "margin outside the trained range of a quantity without physical bounds", _START
+    )
+    clock_skew: float = _fixed(1.0, "s", "clocks of a source and of the controller differ by this much", _OWN)
+    stopped_speed: float = _fixed(10.0, "1/min", "a tachometer may show a few revolutions at rest", _START)
+
+    # watch (sensor monitoring)
+    check_interval: float = _fixed(10.0, "s", "temperatures change slowly; sensors are checked this often", _WATCH)
+    fault_duration: float = _fixed(300.0, "s", "a shorter jump or difference does not count as a failure", _WATCH)
+    return_time: float = _fixed(
+        600.0, "s", "a missing sensor must agree with its prediction for this time before it is trusted again", _WATCH
+    )
+    substitute_fade: float = _fixed(
+        3600.0, "s", "time constant with which a substitute moves to the prediction, without a jump", _WATCH
+    )
+    fault_rest: float = _fixed(
+        3600.0, "s", "effect of a failure on the predictions of other sensors, and of an untrained speed", _WATCH
+    )
+    heat_factor: float = _fixed(2.0, "", "a speed beyond this multiple of the top speed adds no heat", _WATCH)
+    fast_factor: float = _fixed(1.02, "", "differences are not evaluated beyond this multiple of the top speed", _WATCH)
+    least_unseen: float = _fixed(0.05, "degC", "least error by which differences are weighted", _WATCH)
+    difference_time: float = _fixed(1800.0, "s", "time constant of the usual difference from the prediction", _WATCH)
+    swap_evidence: float = _fixed(
+        0.1, "", "a swap of two sensors is excluded once it has increased the mean square residual by this", _WATCH
+    )
+
+    # adaptation by probings
+    offset_decay: float = _fixed(4 * 3600.0, "s", "an offset represents the present state of the machine", _PROBING)
+    direction_decay: float = _fixed(
+        7 * 86400.0, "s", "the weights of the averaged regressions represent what the training left open", _PROBING
+    )
+    unexplained: float = _fixed(
+        0.2, "", "share of the error on left-out cycles that neither offset nor directions explain", _PROBING
+    )
+    suspect: float = _fixed(
+        2.5, "standard deviations", "beyond this an unconfirmed probing counts less (Hampel's function)", _PROBING
+    )
+    suspect_first: float = _fixed(
+        2.0, "standard deviations", "the same for the first probing within `offset_decay`", _PROBING
+    )
+    implausible: float = _fixed(4.0, "standard deviations", "beyond this an unconfirmed probing is refused", _PROBING)
+    least_usual: float = _fixed(
+        0.5, "", "least typical error as a share of the overall RMS: most cycles have smaller errors", _PROBING
+    )
+    probings_averaged: float = _fixed(
+        5.0, "probings", "number over which the size of the present day's errors is averaged", _PROBING
+    )
+    agreement: float = _fixed(
+        5.0, "standard deviations", "two probings that differ by no more confirm each other", _PROBING
+    )
+    probing_interval: float = _fixed(
+        600.0, "s", "probings closer in time do not confirm each other: it may be the same chip", _PROBING
+    )
+    confirmed: float = _fixed(
+        3.0, "standard deviations", "a confirmed error counts as this many of the offset from then on", _PROBING
+    )
+    most_error: float = _fixed(
+        10.0, "", "largest error of a model as a multiple of that on left-out cycles (RMS); 8.2 was observed", _PROBING
+    )
+    most_drift: float = _fixed(3.0, "", "largest error of a model as a multiple of the drift (RMS)", _PROBING)
+    least_error: float = _fixed(1e-3, "um", "least error that is assumed", _OWN)
+
+    # restart
+    caught_up: float = _fixed(
+        0.1, "um", "after a restart a correction is active once it is this close to its models", _OWN
+    )
+    resumable: float = _fixed(
+        24 * 3600.0,
+        "s",
+        "of an older state only the corrections in force are kept; probings are remembered",
+        _OWN,
+    )
+
+    def __post_init__(self) -> None:
+        numbers = {f.name: getattr(self, f.name) for f in fields(self)}
+        check_finite("thresholds", RANGE, least_temperature=numbers.pop("least_temperature"))
+        check_between("thresholds", LEAST, GAP, **numbers)
+        if not self.least_temperature < self.most_temperature:
+            raise SettingError(
+                f"thresholds: least_temperature = {self.least_temperature:g} degC must be below most_temperature = "
+                f"{self.most_temperature:g} degC"
+            )
+        if not max(self.suspect, self.suspect_first) < self.implausible:
+            raise SettingError(
+                f"thresholds: suspect = {self.suspect:g} and suspect_first = {self.suspect_first:g} must be below "
+                f"implausible = {self.implausible:g}"
+            )
+
+    @property
+    def rows(self) -> tuple[Threshold, ...]:
+        """Thresholds with unit, reason and source."""
+        return tuple(Threshold(f.name, getattr(self, f.name), **f.metadata) for f in fields(self))
+
+    @cached_property
+    def plausible(self) -> dict[str, tuple[float, float]]:
+        """Possible values of each quantity; a value outside indicates a sensor failure."""
+        return {
+            "temperature": (self.least_temperature, self.most_temperature),
+            "spindle_speed": (-self.most_speed, self.most_speed),
+            "position": (-self.most_position, self.most_position),
+        }
+
+
+#: those of new models
+THRESHOLDS = Thresholds()
