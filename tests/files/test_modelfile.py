@@ -140,7 +140,8 @@ def altered(change: dict[str, object]) -> str:
             del entry[key]
         else:
             entry[key] = value
-    content["sha256"] = jsonfile.digest(content["models"])
+    shared = {k: content[k] for k in jsonfile.MODELS.shared if k in content}
+    content["sha256"] = jsonfile.digest(content["models"], shared)
     return json.dumps(content)
 
 

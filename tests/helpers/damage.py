@@ -87,7 +87,8 @@ def sign(content: Any) -> str:
     """Return the text of a file whose checksum fits, as somebody would write it who knows how."""
     if isinstance(content, dict) and isinstance(content.get("models"), list):
         try:
-            content["sha256"] = jsonfile.digest(content["models"])
+            shared = {k: content[k] for k in jsonfile.MODELS.shared if k in content}
+            content["sha256"] = jsonfile.digest(content["models"], shared)
         except ValueError:  # an infinity: it has no checksum
             content["sha256"] = ""
     return json.dumps(content)

@@ -16,6 +16,7 @@ from thermocomp.core.inputs import Input, Support
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.zero import FIRST_READING, Zeroing
 from thermocomp.runtime.compensator import Compensator
 
@@ -56,7 +57,9 @@ def draw_compensator(seed: int) -> Drawn:
     rng, zeroing = np.random.default_rng((1, seed)), ZEROINGS[seed % len(ZEROINGS)]
     plant = draw_plant(rng)
     inputs = draw_inputs(rng, plant)
+    thresholds = draw_thresholds(seed) if seed % 3 == 2 else THRESHOLDS
     watch = draw_watch(rng, plant, inputs, HEATER, zeroing) if seed % 4 else None
+    watch = watch and replace(watch, thresholds=thresholds)
     models: list[ErrorModel] = []
     for k in range(int(rng.integers(1, 6))):
         if models and rng.random() < 0.3:  # steps together with the one before
@@ -68,9 +71,19 @@ def draw_compensator(seed: int) -> Drawn:
         refused = k > 0 and (seed + k) % 6 == 5
         honest = replace(ACCEPTED, lost=lost, verdict="refused" if refused else "accepted")
         known = watch if k == 0 or rng.random() < 0.8 else None
-        models.append(replace(model, target=f"e{k}_um", zeroing=zeroing, watch=known, honest_error=honest))
+        own = replace(model, target=f"e{k}_um", zeroing=zeroing, watch=known, thresholds=thresholds)
+        models.append(replace(own, honest_error=honest))
     limits = draw_limits(rng)
     return Drawn(Compensator.of(draw_sources(rng, models), limits, watching=True), plant)
+
+
+def draw_thresholds(seed: int) -> Thresholds:
+    """Return thresholds of half to twice the usual values."""
+    rng = np.random.default_rng((5, seed))
+    usual = {row.name: row.value for row in THRESHOLDS.rows}
+    drawn = {name: float(round(value * 2.0 ** rng.uniform(-1.0, 1.0), 4)) for name, value in usual.items()}
+    drawn["implausible"] = 2.0 * max(drawn["suspect"], drawn["suspect_first"])
+    return Thresholds(**drawn)
 
 
 #: how a zero is averaged: the first reading, or more, with and without a channel that shows whether the spindle stands

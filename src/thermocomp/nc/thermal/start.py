@@ -162,7 +162,10 @@ def hand_over_state(station: Station, state: State, zero: float, doubt: float) -
 
 def identity(model: ErrorModel) -> str:
     """Return a hash of the parameters of a model, independent of its origin and assessment."""
-    numbers = {k: v for k, v in asdict(model).items() if k not in ("family", "provenance", "honest_error")}
+    others = ("family", "provenance", "honest_error", "thresholds")
+    numbers = {k: v for k, v in asdict(model).items() if k not in others}
+    if numbers["watch"]:
+        del numbers["watch"]["thresholds"]
     return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
 
 
