@@ -15,24 +15,26 @@ async def main() -> float:
     with TemporaryDirectory() as folder:
         # virtual/verbs.py; for a file tc.read("drift.csv"), api/inputs.py
         *days, new_day = tc.simulate("wessel-milling")
-        found = tc.compare(days, "s1_um", ["ols", "mra"], leave_one="file", jobs=1)  # api/verbs.py, judging/compare.py
-        print(found)  # the do-no-harm gate: judging/do_no_harm.py
+        # api/verbs.py, judging/compare.py; the do-no-harm gate: judging/do_no_harm.py
+        found = tc.compare(days, "s1_um", ["ols", "mra"], leave_one="file", jobs=1)
+        print(found)
         best = found.best["s1_um"]  # "ols": models/ols.py
         assert best is not None, "no model may run"
-        fitted = tc.fit(days, "s1_um", best, leave_one="file", jobs=1)  # judging/study.py; freeze(): models/linear.py
+        fitted = tc.fit(days, "s1_um", best, leave_one="file", jobs=1)  # judging/study.py; freeze(): models/base.py
         path = fitted.save(Path(folder) / "model.json")  # files/modelfile.py
-        print(tc.assess(path, new_day))  # evaluated by a replay through the compensator: judging/replay.py
+        print(tc.assess(path, new_day))  # a replay, as at the machine: judging/replay.py, runtime/batch.py
 
-        (model,) = modelfile.read(path)  # core/model.py
+        (model,) = modelfile.read(path)  # files/modelfile.py; an ErrorModel: core/model.py
         compensator = Compensator.of([model], tc.Limits(rate=1.0))  # runtime/compensator.py
         sink = FileSink(path=Path(folder) / "corrections.json")  # live/adapters/plain.py; the ports: core/ports.py
         await sink.connect(timeout=1.0)
         state, left = compensator.start(), []  # all memory is in `state`: runtime/state.py
         names = [i.name for i in model.inputs]
+        # watch, gate, zero, model, change of sign (only in core/correction.py), limits: runtime/compensator.py
         for time, row in zip(new_day.time, new_day.table.to_dict("records"), strict=True):
             reading = tc.Reading(float(time), {name: row[name] for name in names})  # core/reading.py
-            state, result = compensator.step(state, reading, now=float(time))  # gate, watch, zero, model, limits
-            await sink.apply(result.corrections)  # the sign is changed in core/correction.py only
+            state, result = compensator.step(state, reading, now=float(time))
+            await sink.apply(result.corrections)
             left.append(row["s1_um"] - new_day.table["s1_um"].iloc[0] + result.corrections["s1_um"].offset)
         await sink.close()
         return float(max(map(abs, left)))

@@ -204,7 +204,8 @@ BODY = HEAD + 'segments = [{duration = "1 min"}]\n'
         (BODY + '[[faults]]\nchannel = "t_air_C"\nkind = "lost"', "[[faults]] 1, key 'start': is missing"),
         (
             BODY + '[[faults]]\nchannel = "t_air_C"\nkind = "lost"\nstart = "2 h"',
-            "[[faults]] 1, key 'start' = '2 h': 7200 s: must be from 0 to the end of the test, 60 s",
+            "[[faults]] 1, key 'start' = '2 h': 7200 s: start of the fault: must be from 0 to the end of the test, "
+            "60 s",
         ),
         (HEAD + 'segments = [{duration = "10000000 h"}]', "give 3.6e+09 rows; at most 10,000,000"),
         (BODY + "copies = 1000000", "key 'copies' = 1000000: expected 1 to 10000 copies"),

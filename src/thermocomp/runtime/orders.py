@@ -32,8 +32,8 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
     ----------
     status : Status or None
         ``holding``: the correction is held until a further command; ``shadow``: the target is predicted, and its
-        correction moves to zero within the limits; ``suspended``: the controller has no correction in force, and it
-        starts at zero again. None: run.
+        correction moves to zero within the limits; ``suspended``: no correction is in force at the controller;
+        after resuming, it starts at zero. None: run.
     """
     if target not in compensator.lines:
         raise InputError(f"there is no target {target}: expected one of {', '.join(compensator.lines)}")

@@ -146,7 +146,8 @@ class PlannedTest(RecordingSetup, Stretch):
             if not 0 <= fault.start <= self.longest:
                 last = f"{self.longest:g} s"
                 raise SettingError(
-                    f"{fault.start:g} s: must be from 0 to the end of the test, {last}", ("faults", k, "start")
+                    f"{fault.start:g} s: start of the fault: must be from 0 to the end of the test, {last}",
+                    ("faults", k, "start"),
                 )
         if self.longest / self.sampling > MOST_ROWS:
             rows = f"{self.longest / self.sampling:.3g} rows"

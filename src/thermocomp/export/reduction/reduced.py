@@ -146,7 +146,7 @@ class Reduced:
 
     @property
     def zeros(self) -> list[float]:
-        """Reference of each temperature, for a formula without a start of a test [degC]."""
+        """Fixed zero of each temperature, for an exported formula that does not know when a test starts [degC]."""
         return [round(i.reference, 2) if i.rezero else i.reference for i, _ in self.terms]
 
     def deviation(self, temperatures: Sequence[float]) -> float:

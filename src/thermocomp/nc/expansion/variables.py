@@ -57,9 +57,9 @@ class Variables:
             key = self._parameters.key(assignment.target)
             if key not in _LOCAL and key not in _COMMON:
                 raise InputError(
-                    f"{assignment.target} is set, but only #1 to #33 and #100 to #199 belong to the program: the "
-                    "others keep their values in the control, and plain lines would not set them; use a variable of "
-                    "the program, or omit --expand if no loop or subprogram needs it"
+                    f"{assignment.target} is set, but only #1 to #33 and #100 to #199 may be assigned: the others "
+                    "keep their values in the control, and the expanded program contains no assignments; use one of "
+                    "these, or omit --expand if no loop or subprogram needs it"
                 )
             if "".join(assignment.value.split()) == "#0":
                 raise InputError(f"{assignment.target} is set to empty (#0), which is not supported; give it a value")

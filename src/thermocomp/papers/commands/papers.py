@@ -62,7 +62,8 @@ def papers(
     names : list of str
         Papers to reproduce; cross: a table of the methods on all experiments. Default: all five papers.
     measured : list of Path
-        Measured recordings on which the methods of cross are judged as well; each one is a separate test.
+        Measured recordings on which the methods of the study `cross` are judged as well; each one is a separate
+        test.
     mapping : Path
         TOML mapping file: role and unit of each column of the measured recordings.
     target : list of str

@@ -82,7 +82,7 @@ class FileLimits:
             counts = next(f.metadata["counts"] for f in fields(self) if f.name == name)
             raise RecordingError(
                 f"{where}: over {most:,} {counts}, which is the limit; found at least {found:,}: delete what is not "
-                f"part of the recording, or raise the limit in a mapping, [limits] {name} = {2 * found}"
+                f"part of the recording, or raise the limit in the mapping file: [limits] {name} = {2 * found}"
             )
 
     def check_table(self, rows: int, columns: int, where: object) -> None:

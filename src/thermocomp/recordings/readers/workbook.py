@@ -79,7 +79,7 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     first = next(iter(sheets), None)
     if first is None:
         raise RecordingError(
-            f"{path}: the workbook has no sheet with cells; a recording has a heading row and rows of numbers"
+            f"{path}: all sheets of the workbook are empty; a recording has a heading row and rows of numbers"
         )
     if len(sheets) == 1:
         return first, ()
