@@ -5,13 +5,17 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from drawnmodels import draw_compensator, draw_thresholds
+from drawnmodels import SPEED, draw_compensator, draw_thresholds
 from test_adaptation import MODEL
 
 from thermocomp.core.exceptions import InputError, ModelFileError, SettingError
 from thermocomp.core.explained import explain
+from thermocomp.core.reading import Reading
+from thermocomp.core.stack import Stack
 from thermocomp.core.thresholds import THRESHOLDS, Thresholds
+from thermocomp.core.zero import Zeroing
 from thermocomp.files import jsonfile, modelfile
 from thermocomp.live import statefile
 from thermocomp.runtime.compensator import Compensator
@@ -90,3 +94,37 @@ def test_an_explanation_shows_them() -> None:
     rows = explain(WATCHED).to_dict()["thresholds"]
     assert Thresholds(**{row["name"]: row["value"] for row in rows}) == WATCHED.thresholds
     assert {"name", "value", "unit", "reason", "source"} == set(rows[0])
+
+
+@pytest.mark.parametrize(("stopped", "waits"), [(20.0, True), (10.0, False)])
+def test_a_spindle_is_stopped_as_the_model_has_it(stopped: float, waits: bool) -> None:
+    """15 1/min: the zero is the mean over 300 s, or the first readings within 10 s."""
+    thresholds, zeroing = replace(THRESHOLDS, stopped_speed=stopped), Zeroing(300.0, 10.0, SPEED)
+    watch = replace(WATCHED.watch, zeroing=zeroing, thresholds=thresholds) if WATCHED.watch else None
+    model = replace(WATCHED, zeroing=zeroing, watch=watch, thresholds=thresholds)
+    machine = Compensator.of([model], watching=True)
+    rest = {i.name: i.reference for i in (*model.inputs, *(watch.inputs if watch else ()))} | {SPEED: 15.0}
+    state = machine.start()
+    for time in (0.0, 5.0, 60.0):
+        state, _ = machine.step(state, Reading(time, rest), time)
+    assert np.isnan(state.models[0].reference).any() == waits
+    assert np.isnan(state.watches[0].reference).any() == waits
+    own = replace(MODEL, zeroing=replace(zeroing, speed="n"), thresholds=thresholds)
+    found = own.predict({"t": [20.0, 20.0, 24.0], "n": [15.0] * 3, "time": [0.0, 5.0, 60.0]}, time="time")
+    assert (np.ptp(found) < 1e-9) == waits  # the readings of the zero are their mean
+
+
+@pytest.mark.parametrize(("stopped", "factor"), [(20.0, 3.0), (10.0, 2.0)])
+def test_a_band_is_that_of_a_stopped_spindle_as_the_model_has_it(stopped: float, factor: float) -> None:
+    model = replace(MODEL, spread=(), thresholds=replace(THRESHOLDS, stopped_speed=stopped))
+    both = [model, replace(model, target="x")]
+    values = np.array([20.0, 15.0])
+    state, _ = model.step(model.init([20.0, 0.0]), values, 0.0)
+    assert model.half_width(state, values) == pytest.approx(factor)
+    machine = Compensator.of(both)
+    reading = Reading(0.0, {"t": 20.0, "n": 15.0})
+    _, result = machine.step(machine.start(), reading, 0.0)
+    assert list(result.half_widths.values()) == pytest.approx([factor, factor])
+    stack = Stack(both)
+    stacked, _ = stack.step(stack.init(), values, 0.0)
+    assert stack.half_widths(stacked, values) == pytest.approx([factor, factor])
