@@ -101,6 +101,11 @@ def _spread(rising: FloatArray, most: FloatArray) -> FloatArray:
     return found.astype(np.float64)
 
 
+def bound_readings(inputs: FloatArray) -> FloatArray:
+    """Return readings clipped such that differences between them stay finite."""
+    return np.minimum(np.maximum(inputs, -READING), READING)
+
+
 def check_finite(owner: str, most: float = COEFFICIENT, **numbers: Any) -> None:
     """Reject numbers that are not finite or exceed a bound."""
     wrong = []

