@@ -40,7 +40,7 @@ check: $(VENV)/.dev
 
 # in a separate environment: the other packages require older libraries. Without R its packages are omitted.
 bench: $(BENCH)/.bench
-	-scripts/system_packages.sh r-base-core r-cran-acepack r-cran-leaps
+	-scripts/system_packages.sh gcc linuxcnc-uspace mosquitto r-base-core r-cran-acepack r-cran-leaps valgrind
 	$(BENCH)/bin/python benchmarks/run.py
 
 docs: $(VENV)/.docs
@@ -62,7 +62,7 @@ $(VENV)/.dev: pyproject.toml
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(BENCH) --editable '.[study]' --group bench
+	scripts/make_venv.sh $(PYTHON) $(BENCH) --editable '.[study,live]' --group bench
 	@touch $@
 
 $(VENV)/.docs: pyproject.toml

@@ -7,7 +7,6 @@ frozen model. Then, if the measured data are available, fl_thermal: rows 0-6668,
 """
 
 import argparse
-import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -18,6 +17,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from measured import find_measured
 from thermocomp.judging.replay import replay_compensated
 from thermocomp.models.training import train
 from thermocomp.recordings.readers import recordings
@@ -104,10 +104,7 @@ def show(title: str, held: list[list[Held]]) -> bool:
 
 def measured(jobs: int) -> None:
     """Print the results on fl_thermal, with each cycle of the rows before the published block left out."""
-    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
-    if not path.is_file():
-        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (path := find_measured("fl_thermal/recording.csv")) is None:
         return
     targets = [f"ch{k}_um" for k in range(1, 6)]
     whole = stack([recordings.read(path)], targets)

@@ -8,7 +8,6 @@ used after every change is no longer unseen. It is evaluated on whole cycles: wi
 selected without the left-out cycle, and over the whole file.
 """
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from measured import find_measured
 from thermocomp.core.zero import FIRST_READING
 from thermocomp.judging import splits
 from thermocomp.judging.compare import compare
@@ -47,10 +47,7 @@ LEARNED = 6669
 
 
 def main() -> int:
-    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
-    if not path.is_file():
-        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (path := find_measured("fl_thermal/recording.csv")) is None:
         return 0
     begin = time.perf_counter()
     targets = [f"ch{k}_um" for k in range(1, 6)]

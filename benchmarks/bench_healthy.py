@@ -7,13 +7,13 @@ recordings of printers without a spindle: a watch fitted to the first half of 20
 and over 06-12 of another printer, whose chamber sensor is absent and reads -180 degC.
 """
 
-import os
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from measured import find_measured
 from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.readers import recordings
@@ -88,9 +88,7 @@ def virtual(count: int) -> bool:
 
 
 def printers() -> bool:
-    folder = Path(os.environ.get("THERMOCOMP_DATA", HERE.parent / "shared" / "data")) / "voron_frame"
-    if not folder.is_dir():
-        print(f"skipped: {folder} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (folder := find_measured("voron_frame")) is None:
         return True
     with tempfile.TemporaryDirectory() as place:
         own = Path(place) / "voron.toml"

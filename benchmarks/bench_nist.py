@@ -4,7 +4,6 @@ Run with ``python benchmarks/bench_nist.py [FOLDER]``; FOLDER holds Longley.dat 
 smallest -log10 of the relative error over all parameters, at most 15. All sides get the same float64 columns.
 """
 
-import os
 import re
 import sys
 from collections.abc import Callable
@@ -15,6 +14,7 @@ import statsmodels.api as sm
 from numpy.typing import NDArray
 from sklearn.linear_model import LinearRegression
 
+from measured import find_measured
 from thermocomp.models.numerics.leastsquares import lstsq
 
 FloatArray = NDArray[np.float64]
@@ -69,9 +69,9 @@ def digits(found: FloatArray, certified: FloatArray) -> float:
 
 
 def main() -> int:
-    root = Path(__file__).resolve().parents[1]
-    data = Path(os.environ.get("THERMOCOMP_DATA", root.parent / "shared" / "data"))
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else data / "nist_strd"
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else find_measured("nist_strd")
+    if folder is None:
+        return 0
     print(f"{'problem':<10}" + "".join(f"{name:>16}" for name in SOLVERS) + f"{'goal':>8}")
     missed = 0
     for name in PROBLEMS:

@@ -7,13 +7,12 @@ without a model.
 """
 
 import argparse
-import os
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from measured import find_measured
 from thermocomp.core.correction import Limits
 from thermocomp.judging.compare import compare
 from thermocomp.judging.probing import Probings
@@ -36,10 +35,7 @@ def cases() -> Iterator[tuple[str, Samples]]:
     for physics in ("linear", "nonlinear"):
         whole = stack(record("demo", physics=physics, seed=3), ["x1_um", "y1_um", "z_um"])
         yield f"demo, {physics}", whole.take(np.arange(len(whole)) % 3 == 0)
-    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
-    if not path.is_file():
-        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (path := find_measured("fl_thermal/recording.csv")) is None:
         return
     found = recordings.read(path)
     samples = stack([found], [c.name for c in found.displacements])

@@ -7,15 +7,14 @@ remains after the report, the RMS of the residual from the report on is divided 
 models may continue without a sensor is determined on the other cycles, by leaving out each of them in turn.
 """
 
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from measured import find_measured
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
@@ -57,10 +56,8 @@ class Cost:
 
 
 def cases() -> Iterator[tuple[str, Samples]]:
-    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
-    if not path.is_file():
-        raise SystemExit(f"{path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (path := find_measured("fl_thermal/recording.csv")) is None:
+        return
     whole = stack([recordings.read(path)], list(TARGETS))
     samples = whole.take((np.arange(len(whole)) < LEARNED) & (np.arange(len(whole)) % 4 == 0))
     yield "fl_thermal, all", samples

@@ -7,15 +7,14 @@ every pair of sensors is swapped, each relative to its own zero, as if the swap 
 without being detected. ``bench_standin.py`` evaluates the effect of failures on the error.
 """
 
-import os
 import sys
 from collections.abc import Iterator
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from measured import find_measured
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
@@ -43,10 +42,7 @@ def cases() -> Iterator[tuple[str, Samples]]:
         thinned = whole.take(np.arange(len(whole)) % 3 == 0)
         yield f"demo, {physics}, six", thinned.only([*FEW, "spindle_rpm"])
         yield f"demo, {physics}, sixteen", thinned
-    shared = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("THERMOCOMP_DATA", shared)) / "fl_thermal" / "recording.csv"
-    if not path.is_file():
-        print(f"skipped: {path} is missing; set THERMOCOMP_DATA to the folder of the measured data")
+    if (path := find_measured("fl_thermal/recording.csv")) is None:
         return
     whole = stack([recordings.read(path)], ["ch1_um"])
     samples = whole.take((np.arange(len(whole)) < LEARNED) & (np.arange(len(whole)) % 4 == 0))

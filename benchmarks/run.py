@@ -17,7 +17,8 @@ def main() -> int:
     wanted = sys.argv[1:]
     names = {p.stem.removeprefix("bench_"): p for p in sorted(here.glob("bench_*.py"))}
     scripts = [p for name, p in names.items() if (name in wanted if wanted else name not in BY_HAND)]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    helpers = os.pathsep.join(filter(None, (str(here.parent / "tests" / "helpers"), os.environ.get("PYTHONPATH"))))
+    environment = {**os.environ, "PYTHONPATH": helpers, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     missed = []
     for script in scripts:
         print(f"\n== {script.stem.removeprefix('bench_')}", flush=True)

@@ -185,7 +185,7 @@ def test_what_is_written_proves_itself(two_targets: Path, flags: tuple[str, ...]
     [
         (r"c_rate = TC_ROUNDED\(0.1, [\d.]+\)", "c_rate = TC(0.11)"),
         (r"s->clock \+ w->dt", "s->clock + w->dt + 1e-6"),
-        (r"/ 3600.0\)", "/ 3700.0)"),
+        (r"c_substitute_fade = 3600.0", "c_substitute_fade = 3700.0"),
         (r"c_hold = 1800.0", "c_hold = 1900.0"),
         (r"s->used\[i\] = w->x\[i\];", "s->used[i] = w->x[i] + TC(1e-6);"),
     ],

@@ -85,7 +85,7 @@ def test_its_own_test_passes(watched: Compensator, units: list[SourceUnit]) -> N
         ("tc_x_check", "w.passes := FALSE", "w.passes := TRUE"),
         ("tc_x_tell_time", "s.clock + w.tc_dt", "s.clock + w.tc_dt + 1.0E-06"),
         ("tc_x_limit", "current + reach", "current + reach * 1.001"),
-        ("tc_x_look", "3600.0", "3700.0"),
+        ("tc_x_tables", "substitute_fade : LREAL := 3600.0", "substitute_fade : LREAL := 3700.0"),
         ("tc_x_tables", "hold : LREAL := 120.0", "hold : LREAL := 121.0"),
     ],
 )

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pickle import PicklingError
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn, Self
 
 import joblib
 import numpy as np
@@ -74,6 +74,10 @@ class EstimatorModel(ErrorModel):
     def layers_with(self, further: Sequence[Node] = ()) -> Layers:  # noqa: ARG002 - an estimator is no expression
         """Return an object that evaluates the estimator instead of compiled expressions."""
         return _Estimated(self)
+
+    def merged(self) -> Self:
+        """Return this model: an estimator has no lags."""
+        return self
 
     @property
     def sensors(self) -> tuple[str, ...]:

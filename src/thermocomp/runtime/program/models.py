@@ -1,5 +1,6 @@
 """Formulas of models as functions of a program: one variable per node, with lags and ticks in the state."""
 
+import re
 from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import add, mul
@@ -19,6 +20,8 @@ from thermocomp.runtime.program.variables import Constants, Kept, Work
 
 #: beyond every argument of a table
 _BEYOND = 1e30
+#: maximum length of a name of a value [characters]
+_LONG = 60
 #: powers with a larger exponent are computed by a library function, which may reject a negative base
 _FACTORS = 16
 
@@ -94,11 +97,37 @@ class Formulas:
         return sizes, values
 
 
+def name_value(node: e.Node) -> str:
+    """Return a name for the value of a node, with its sensor and lag, valid in C and structured text; empty if none."""
+    match node:
+        case e.Input(_, name):
+            found = f"x_{name}"
+        case e.Clip(of, _, _):
+            found = f"{name_value(of)}_clip"
+        case e.Lag(of, tau):
+            found = f"{name_value(of).removesuffix('_clip')}_lag_{tau:.0f}_s"
+        case e.PacedLag(of, stopped, running, _):
+            found = f"{name_value(of)}_lag_{stopped:.0f}_to_{running:.0f}_s"
+        case e.Magnitude(of):
+            found = f"{name_value(of).removesuffix('_clip')}_size"
+        case e.Product(factors) if len(others := [f for f in factors if not isinstance(f, e.Constant)]) == 1:
+            found = f"{name_value(others[0]).removesuffix('_clip')}_term"
+        case e.Power(of, exponent):
+            found = f"{name_value(of)}_to_{exponent:g}"
+        case e.Named(_, of):
+            return name_value(of)
+        case _:
+            return ""
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", found).strip("_")
+    return plain if plain.startswith("x_") and len(plain) <= _LONG else ""
+
+
 class _Arithmetic:
     """Values of an expression's nodes as local variables; a repeated node is computed once."""
 
     def __init__(self) -> None:
         self._known: dict[e.Node, Number] = {}
+        self._names = set[str]()
 
     def value(self, node: e.Node) -> Number:
         """Return the value of an expression's node, computed once."""
@@ -108,8 +137,18 @@ class _Arithmetic:
             return real(node.value)
         if (known := self._known.get(node)) is None:
             found = self._found(node)
-            known = self._known[node] = let(f"v{len(self._known)}", found)
+            known = self._known[node] = let(self._new_name(node), found)
         return known
+
+    def _new_name(self, node: e.Node) -> str:
+        """Return a new name of a variable: that of the sensor and the operation if there is one, otherwise a number."""
+        number = len(self._known)
+        wanted = name_value(node)
+        name = wanted or f"v{number}"
+        while name.lower() in self._names:  # structured text does not distinguish upper and lower case
+            name = f"{name}_{number}"
+        self._names.add(name.lower())
+        return name
 
     def _found(self, node: e.Node) -> Number:  # noqa: PLR0911 - one case per node type
         match node:
