@@ -7,7 +7,7 @@ KEPT, COUNTED = 64, 10_000
 
 
 class Latest(dict[str, tuple[float, float]]):
-    """Value and time of arrival, by channel name.
+    """Value and time of measurement, by channel name.
 
     Parameters
     ----------
@@ -25,17 +25,21 @@ class Latest(dict[str, tuple[float, float]]):
         """Number of channel names that were not stored; `COUNTED` means that number or more."""
         return len(self._left_out)
 
-    def take(self, values: Mapping[str, float], tick: float, longest: float) -> str:
-        """Store values; return the first channel name that was not stored, if all were stored until then.
+    def take(self, values: Mapping[str, float], tick: float, longest: float, measured: float | None = None) -> str:
+        """Store values, but not in place of newer ones.
+
+        Returns the first channel name that was not stored, if all were stored until then.
 
         Parameters
         ----------
         tick : float
             Present time [s].
+        measured : float, optional
+            Time of the values; default: now [s].
         longest : float
             Time without a value after which an unused name may be replaced [s].
         """
-        first, others = "", values.keys() - self.used
+        first, others, at = "", values.keys() - self.used, tick if measured is None else measured
         if new := others - self.keys():
             room = KEPT - len(self.keys() - self.used)
             if room < len(new):
@@ -49,5 +53,7 @@ class Latest(dict[str, tuple[float, float]]):
             self._left_out.update(map(hash, ordered[room : room + COUNTED - len(self._left_out)]))
         for name, value in values.items():
             if name in self.used or name in self or name in new:
-                self[name] = (value, tick)
+                before = self.get(name)
+                if before is None or before[1] <= at:
+                    self[name] = (value, at)
         return first

@@ -24,7 +24,7 @@ TIMEOUT = 5.0
 FIRST, LONGEST = 0.5, 30.0
 #: interval at which a sink is asked for the correction in force [s]
 OFTEN = 2.0
-#: minimum time between two events about refused messages of a link [s]
+#: minimum time between two events about refused messages of a link, or about invalid time stamps [s]
 SELDOM = 60.0
 
 

@@ -1,6 +1,7 @@
 """The service: receives readings, runs the compensator, sends corrections; a failed link does not stop it."""
 
 import asyncio
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
@@ -17,8 +18,9 @@ from thermocomp.live.inforce import ConfirmedCorrections, suspensions
 from thermocomp.live.keeper import CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
-from thermocomp.live.links import TIMEOUT, Inlet, Link, Outlet, within
+from thermocomp.live.links import SELDOM, TIMEOUT, Inlet, Link, Outlet, within
 from thermocomp.live.recorder import Recorder
+from thermocomp.live.stamps import explain_stamp
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import order, rezero, withdraw
@@ -60,6 +62,7 @@ class Service:
         self.state = self.keeper.begin()
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
         self._heard = self.clock.tick()
+        self._untimely = "", -math.inf  # why the stamp of a reading was invalid, and when
 
     # -- interface -----------------------------------------------------------------------------------------------------
 
@@ -91,10 +94,13 @@ class Service:
             return
         tick, now = self.clock.tick(), self.clock.now()
         stamp, most = self.clock.of(reading.time), self.compensator.limits.reading_age
-        if not -most <= now - stamp <= most:
+        if why := explain_stamp(stamp, now, most):
             self.counts["rejected"] += 1
+            if tick - self._untimely[1] > SELDOM * self.clock.speed:
+                self.say("link", f"readings are not used: {why}")
+                self._untimely = why, tick
             return
-        if left_out := self.latest.take(reading.values, tick, most):
+        if left_out := self.latest.take(reading.values, tick, most, tick - max(now - stamp, 0.0)):
             self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         probings, learned = self.probings.take(), self.state.learned
@@ -158,6 +164,12 @@ class Service:
         for outlet in self.outlets:
             await outlet.flush()
 
+    @property
+    def untimely(self) -> str:
+        """Why readings were not used lately because of their time stamps; empty if all were valid."""
+        why, at = self._untimely
+        return why if self.clock.tick() - at <= 2 * SELDOM * self.clock.speed else ""
+
     def links(self) -> list[Link]:
         """Return the links of sources, probes and sinks, in this order."""
         return [*self.inlets, *self.outlets]
@@ -193,7 +205,7 @@ class Service:
             if self._ending:
                 continue
             if silent > max(2.0, 2.0 * self.clock.speed):
-                why = f"no reading for {silent:.0f} s"
+                why = f"no reading for {silent:.0f} s" + (f": {self.untimely}" if self.untimely else "")
                 self.state, said = self.compensator.wait(self.state, tick, why)
                 self._tell(said, {})
                 if self.recorder is not None:

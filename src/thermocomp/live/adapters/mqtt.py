@@ -14,6 +14,7 @@ from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Reading
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
+from thermocomp.live.adapters.inbox import Inbox
 from thermocomp.live.adapters.messages import read_message, write_message
 
 
@@ -32,7 +33,7 @@ class Broker:
         await self.close()
         self._connection.to("connecting")
         try:
-            client = aiomqtt.Client(self.host, self.port, timeout=timeout)
+            client = aiomqtt.Client(self.host, self.port, timeout=timeout, queue_type=self._queue())
             async with asyncio.timeout(timeout):
                 await client.__aenter__()
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
@@ -41,6 +42,10 @@ class Broker:
             raise ThermocompError(reason) from e
         self._client = client
         self._connection.to("connected")
+
+    def _queue(self) -> type[asyncio.Queue[aiomqtt.Message]] | None:
+        """Return the queue of incoming messages; default: that of the library."""
+        return None
 
     def status(self) -> LinkStatus:
         """Return the connection status without blocking."""
@@ -78,26 +83,61 @@ class MqttSource(Broker):
     names: dict[str, str] = field(default_factory=dict)
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
+    _inbox: Inbox | None = field(default=None, init=False, repr=False)
+
+    @property
+    def replaced(self) -> int:
+        """Number of values that were replaced by newer ones before they were processed, since the last connection."""
+        return self._inbox.replaced if self._inbox else 0
+
+    def _queue(self) -> type[asyncio.Queue[aiomqtt.Message]]:
+        """Return a queue that hands over each message on arrival: in a queue its age would be unknown."""
+        inbox, receive = Inbox(), self._receive
+        self._inbox = inbox
+
+        class Door(asyncio.Queue[aiomqtt.Message]):
+            def put_nowait(self, item: aiomqtt.Message) -> None:
+                receive(inbox, item)
+
+        return Door
+
+    def _receive(self, inbox: Inbox, message: aiomqtt.Message) -> None:
+        try:
+            payload = message.payload if isinstance(message.payload, bytes | str) else b""
+            reading = read_message(payload, -1.0 if message.retain else time.time(), self.names)
+        except ReadingError as e:
+            self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
+            return
+        if reading.time >= 0.0:
+            inbox.put(reading)
 
     async def readings(self) -> AsyncIterator[Reading]:
         """Return readings as they arrive, until the connection to the broker is lost.
 
-        A message retained by the broker is used only if it contains its time of sampling.
+        A message without time is stamped when it arrives. If messages arrive faster than they are processed, the newest
+        value of each channel is used. A message retained by the broker is used only if it contains its time.
         """
-        client = self._connected()
+        client, inbox = self._connected(), self._inbox
+        assert inbox is not None
         try:
             await client.subscribe(self.topic, qos=0)
-            async for message in client.messages:
-                try:
-                    payload = message.payload if isinstance(message.payload, bytes | str) else b""
-                    reading = read_message(payload, -1.0 if message.retain else time.time(), self.names)
-                except ReadingError as e:
-                    self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
-                    continue
-                if reading.time >= 0.0:
-                    yield reading
+            lost = asyncio.create_task(_wait_for_loss(client))
+            lost.add_done_callback(lambda _: inbox.close())
+            try:
+                while not inbox.closed:
+                    for reading in await inbox.take():
+                        yield reading
+                await lost
+            finally:
+                lost.cancel()
         except (aiomqtt.MqttError, OSError, ValueError) as e:
             raise self._fail(e) from e
+
+
+async def _wait_for_loss(client: aiomqtt.Client) -> None:
+    """Wait until the connection is lost: messages do not pass this way."""
+    async for _ in client.messages:
+        pass
 
 
 @dataclass(kw_only=True)

@@ -1,0 +1,130 @@
+"""Messages that arrive faster than they are processed: the newest value of each channel, in time, in bounded memory."""
+
+import asyncio
+import json
+import math
+import time
+from pathlib import Path
+
+import aiomqtt
+import pytest
+from broker import Mosquitto
+from hypothesis import given
+from hypothesis import strategies as st
+
+from thermocomp.core.reading import Reading
+from thermocomp.live.adapters.inbox import MOST, Inbox
+from thermocomp.live.adapters.mqtt import MqttSource
+from thermocomp.live.latest import Latest
+from thermocomp.live.stamps import explain_stamp
+
+NOW = 1_790_000_000.0
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0.0, 100.0), st.dictionaries(st.sampled_from("abc"), st.floats(-9.0, 9.0))), max_size=9
+    )
+)
+def test_the_newest_value_of_each_channel_remains(messages: list[tuple[float, dict[str, float]]]) -> None:
+    inbox = Inbox()
+    newest: dict[str, tuple[float, float]] = {}
+    for at, values in messages:
+        inbox.put(Reading(at, values))
+        for name, value in values.items():
+            if name not in newest or newest[name][0] <= at:
+                newest[name] = at, value
+    if not messages:
+        return
+    found = asyncio.run(inbox.take())
+    assert [r.time for r in found] == sorted({at for at, _ in newest.values()})
+    assert {name: (r.time, v) for r in found for name, v in r.values.items()} == newest
+    assert inbox.replaced == sum(len(values) for _, values in messages) - len(newest)
+
+
+def test_its_memory_is_bounded_and_the_newest_stay() -> None:
+    inbox = Inbox()
+    for k in range(3 * MOST // 1000):
+        inbox.put(Reading(float(k), {f"t{k} {n}": 1.0 for n in range(1000)}))
+    found = asyncio.run(inbox.take())
+    assert [r.time for r in found] == [float(k) for k in range(2 * MOST // 1000, 3 * MOST // 1000)]
+    assert inbox.replaced == 2 * MOST
+
+
+def test_a_slow_service_uses_fresh_values(tmp_path: Path) -> None:
+    """5,000 messages a second, without time, against a service that takes 1 ms for each."""
+    broker, count = Mosquitto(tmp_path), 10_000
+    broker.start()
+
+    async def publish() -> None:
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            begin = time.monotonic()
+            for k in range(count):
+                if (ahead := begin + k / 5000.0 - time.monotonic()) > 0:
+                    await asyncio.sleep(ahead)
+                await client.publish("m/t", json.dumps({"sent": time.time(), "other": 1.0, "last": k == count - 1}))
+
+    async def run() -> tuple[list[float], MqttSource]:
+        source, ages = MqttSource(topic="m/t", port=broker.port), list[float]()
+        await source.connect(5.0)
+        try:
+            stream = source.readings()
+            pull = asyncio.ensure_future(anext(stream))
+            await asyncio.sleep(0.2)  # subscribed
+            task = asyncio.create_task(asyncio.to_thread(asyncio.run, publish()))
+            while True:
+                done, _ = await asyncio.wait({pull}, timeout=2.0)
+                if not done:  # all messages have been published
+                    pull.cancel()
+                    await task
+                    return ages, source
+                ages.append(time.time() - pull.result().values["sent"])
+                time.sleep(0.001)  # the service is busy
+                pull = asyncio.ensure_future(anext(stream))
+        finally:
+            await source.close()
+
+    try:
+        ages, source = asyncio.run(run())
+    finally:
+        broker.kill()
+    assert max(ages) < 1.0
+    assert source.replaced > 0
+    assert len(ages) < count
+
+
+def test_an_older_value_does_not_replace_a_newer_one() -> None:
+    latest = Latest(["t"])
+    latest.take({"t": 1.0}, 100.0, 60.0, 95.0)
+    latest.take({"t": 2.0}, 101.0, 60.0, 90.0)
+    assert latest["t"] == (1.0, 95.0)
+    latest.take({"t": 3.0}, 102.0, 60.0, 95.0)
+    assert latest["t"] == (3.0, 95.0)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "words"),
+    [
+        (NOW + 59.0, ""),
+        (NOW - 60.0, ""),
+        (NOW * 1e3, "looks like milliseconds"),
+        ((NOW + 5000.0) * 1e6, "looks like microseconds"),
+        (NOW * 1e9, "looks like nanoseconds"),
+        (123.0, "since the start of the device"),
+        (NOW + 7200.0, "7,200 s ahead of the clock of this computer, 2 h: the source sends local time"),
+        (NOW - 3600.0 + 5.0, "3,595 s behind the clock of this computer, 1 h: the source sends local time"),
+        (NOW - 19_800.0, "5.5 h: the source sends local time"),
+        (NOW + 400.0, "400 s ahead of the clock of this computer, where 60 s are allowed: set the clock of the source"),
+        (NOW - 40 * 86400.0, "where 60 s are allowed"),
+        (-5.0, "since the start of the device"),
+    ],
+)
+def test_a_stamp_that_cannot_be_right_is_named(stamp: float, words: str) -> None:
+    found = explain_stamp(stamp, NOW, 60.0)
+    assert words in found if words else not found
+
+
+@given(st.floats(-1e18, 1e18))
+def test_every_stamp_is_used_or_explained(stamp: float) -> None:
+    assert math.isfinite(stamp)
+    assert (explain_stamp(stamp, NOW, 60.0) == "") == (abs(stamp - NOW) <= 60.0)
