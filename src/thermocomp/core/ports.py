@@ -65,7 +65,37 @@ class Confirming(Protocol):
     """A sink that can report the correction in force at the controller."""
 
     async def confirmed(self) -> Mapping[str, Correction] | None:
-        """Return the correction in force per axis or target; None if unknown."""
+        """Return the correction in force per axis or target; None if unknown.
+
+        A sink with a true attribute ``only_sent`` reads back what it has written, such as a file; its controller may
+        not have used it.
+        """
+        ...
+
+
+@runtime_checkable
+class Remembering(Protocol):
+    """A sink that can return what was last sent to it, by an earlier run of the service."""
+
+    async def last_sent(self) -> Mapping[str, Correction] | None:
+        """Return the corrections last sent, per axis or target; None if there are none."""
+        ...
+
+
+class TargetStatus(NamedTuple):
+    """Status of a target or axis, as a sink may pass it on with the correction."""
+
+    word: str  #: such as ``active`` or ``holding``
+    reason: str = ""
+    half_width: float | None = None  #: of the uncertainty band [um]; None without one
+
+
+@runtime_checkable
+class Informing(Protocol):
+    """A sink that passes on the status of the targets with their corrections."""
+
+    def inform(self, statuses: Mapping[str, TargetStatus]) -> None:
+        """Store the statuses for the next corrections."""
         ...
 
 

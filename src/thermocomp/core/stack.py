@@ -25,6 +25,7 @@ class StackState(NamedTuple):
     memory: FloatArray | None  #: (..., n_memory); None before the first reading
     deviation: FloatArray  #: (..., n_models), last deviations returned
     outside: BoolArray  #: (..., n_taps), inputs beyond the trained range
+    outputs: FloatArray  #: (..., n_outputs), of the expressions: deviations within the trained range, then spreads
 
 
 class Stack:
@@ -84,7 +85,7 @@ class Stack:
     def init(self) -> StackState:
         """Return the state of a machine that has just been zeroed: see `ErrorModel.init`."""
         nowhere = np.zeros(len(self._zero), dtype=np.bool_)
-        return StackState(self._zero.copy(), None, np.zeros(len(self.models)), nowhere)
+        return StackState(self._zero.copy(), None, np.zeros(len(self.models)), nowhere, np.empty(0))
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
         """Process one reading and return the deviations at its time.
@@ -115,10 +116,10 @@ class Stack:
         if memory is None:
             memory, dt = self._layers.begin(clipped), 0.0
         memory, found = self._layers.advance(memory, clipped, dt)
-        deviation = found[..., : len(self.models)]
+        deviation = found[..., : len(self.models)].copy()
         if self._joint or outside.any():
             deviation = self._supported(state.deviation, deviation, change, clipped)
-        return StackState(reference, memory, deviation, outside), deviation
+        return StackState(reference, memory, deviation, outside, found), deviation
 
     def _changes(self, reference: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the values of all taps minus their reference, and these clipped to the trained ranges."""
@@ -145,12 +146,12 @@ class Stack:
         return deviation
 
     def half_widths(self, state: StackState, values: FloatArray) -> FloatArray:
-        """Return the half-widths of the bands about the deviations of a reading.
+        """Return the half-widths of the bands about the deviations of the last reading.
 
         Parameters
         ----------
         values : ndarray of shape (..., n_inputs)
-            The reading.
+            That reading.
 
         Returns
         -------
@@ -161,7 +162,7 @@ class Stack:
         if state.memory is None or all(m.band is None for m in self.models):
             return found
         _, clipped = self._changes(state.reference, values)
-        said = self._layers.advance(state.memory, clipped, 0.0)[1]
+        said = state.outputs
         for k, m in enumerate(self.models):
             if m.band is not None:
                 spread = np.sqrt((said[..., self._ends[k] : self._ends[k + 1]] ** 2).sum(axis=-1))

@@ -40,6 +40,8 @@ def build(settings: ServiceSettings) -> Service:
         sinks=[one.open(folder) for one in config.sinks],
         clock=ServiceClock(config.speed),
         state_path=folder / config.state if config.state else None,
+        first_start=config.first_start,
+        at_unknown=config.at_unknown,
         probes=[_probe(one, sources, tuple(compensator.lines)) for one in config.probes],
     )
     if (kept := config.journal) is not None:

@@ -143,6 +143,9 @@ class Config:
         Whether the controller compensates for temperature by itself.
     at_stop : {'hold', 'fade'}
         Corrections after a stop: unchanged, or faded to zero first, within the limits.
+    first_start, at_unknown : {'order', 'zero'}
+        If the correction in force is unknown at the first start, without a state file, or at a later one: wait for the
+        order ``start``, or start from zero.
     """
 
     sources: tuple[SourceSection, ...]
@@ -158,6 +161,8 @@ class Config:
     journal: JournalOut | None = None
     own_compensation: Literal["on", "off", "unknown"] = "unknown"
     at_stop: Literal["hold", "fade"] = "hold"
+    first_start: Literal["order", "zero"] = "order"
+    at_unknown: Literal["order", "zero"] = "order"
 
     def __post_init__(self) -> None:
         if found := list(self._wrong()):

@@ -2,12 +2,23 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.ports import Confirming, Sink, Suspending
 from thermocomp.live.clock import ServiceClock
+from thermocomp.live.links import Outlet
 from thermocomp.live.recorder import CONFIRM_WITHIN
 from thermocomp.runtime.state import CompensatorState, Status
+
+
+class AtController(NamedTuple):
+    """What is known of a correction at the controller."""
+
+    word: Literal["confirmed", "sent, not confirmed", "not confirmed", "not sent"]
+    reason: str = ""
+    correction: Correction | None = None  #: as confirmed
+    age: float | None = None  #: real time since the confirmation [s]
 
 
 class ConfirmedCorrections:
@@ -15,7 +26,7 @@ class ConfirmedCorrections:
 
     def __init__(self, sinks: Sequence[Sink], clock: ServiceClock) -> None:
         # the report of a controller takes precedence over that of a file
-        controllers: list[Sink] = [s for s in sinks if isinstance(s, Suspending)]
+        controllers: list[Sink] = [s for s in sinks if confirms(s)]
         self._sure, self._clock = controllers or list(sinks), clock
         self._alarms = dict[str, str]()
         #: correction and time of its confirmation, by target [um, s]
@@ -36,6 +47,26 @@ class ConfirmedCorrections:
         found, at = self.confirmed.get(target, (None, -math.inf))
         return found if self._clock.tick() - at <= CONFIRM_WITHIN * self._clock.speed else None
 
+    def at_controller(self, target: str, outlets: Sequence[Outlet]) -> AtController:
+        """Return what is known of the correction of a target at the controllers and other sinks that receive it."""
+        mine = [one for one in outlets if one.receives(target)]
+        if not mine:
+            return AtController("not sent", "no sink receives this correction")
+        for one in mine:
+            link = one.status()
+            if link.state != "connected":
+                return AtController("not confirmed", f"{one.name}: {link.reason or link.state}")
+        controllers = [one for one in mine if confirms(one.sink)]
+        if not controllers:
+            return AtController("sent, not confirmed", f"{mine[0].name} does not confirm what is in force")
+        found, at = self.confirmed.get(target, (None, -math.inf))
+        age = (self._clock.tick() - at) / self._clock.speed
+        if found is None or age > CONFIRM_WITHIN:
+            return AtController("not confirmed", f"{controllers[0].name} has not reported the correction in force")
+        if alarm := self._alarms.get(target):
+            return AtController("not confirmed", alarm, found, age)
+        return AtController("confirmed", "", found, age)
+
     def new_alarms(self, sink: Suspending) -> Iterator[str]:
         """Yield changes of alarms: a correction in force that differs from the commanded one, or no longer does."""
         alarms = dict(sink.alarms())
@@ -43,6 +74,11 @@ class ConfirmedCorrections:
             if alarms.get(target) != self._alarms.get(target):
                 yield f"{target}: {alarms.get(target, 'the correction is in force again as commanded')}"
         self._alarms = alarms
+
+
+def confirms(sink: Sink) -> bool:
+    """Return whether a sink reports what the controller has."""
+    return isinstance(sink, Confirming) and not getattr(sink, "only_sent", False)
 
 
 def suspensions(

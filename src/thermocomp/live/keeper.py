@@ -33,6 +33,8 @@ class StateKeeper:
         self._refused: Path | None = None
         #: reason why the last save failed; empty if it succeeded
         self.not_saved = ""
+        #: whether the state comes from the file, and whether there was no file
+        self.resumed, self.first, self.configured = False, True, path is not None
 
     def begin(self) -> CompensatorState:
         """Return the initial state of the compensator: from the file, or that of a cold start."""
@@ -42,6 +44,7 @@ class StateKeeper:
         if not self._path.exists():
             self._say(f"cold start: there is no {self._path}")
             return cold
+        self.first = False
         try:
             saved = statefile.read(self._path, self._compensator)
         except ThermocompError as e:
@@ -56,6 +59,7 @@ class StateKeeper:
         state = resume(saved.state, cold, age, None, self._clock.tick(), self._compensator.thresholds.resumable)
         # orders by the controller or the configuration are not restored: they are issued again
         own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
+        self.resumed = True
         state = state._replace(orders=cold.orders | own)
         how = "continues" if state.references else "starts again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
@@ -77,6 +81,6 @@ class StateKeeper:
             statefile.write(state, self._compensator, self._path, datetime.now(UTC) - old)
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
-            if self.not_saved != str(e):
+            if not self.not_saved:
                 self._say(f"the state is not saved: {e}")
             self.not_saved = str(e)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.ports import Confirming, LinkStatus, Probe, Sink, Source
+from thermocomp.core.ports import Confirming, Informing, LinkStatus, Probe, Sink, Source, TargetStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.core.shown import escape
 
@@ -37,6 +37,8 @@ class Link:
         self._wait, self._told, self._refused = FIRST, "", (0, -SELDOM)
         self._losses = deque[str](maxlen=2)  # losses still to be reported: one may be shorter than the polling interval
 
+    ended = False  #: a source has been played to its end
+
     async def run(self) -> None:
         """Connect and work indefinitely, or until a source has been played to its end."""
         task = asyncio.current_task()
@@ -47,6 +49,7 @@ class Link:
                 self.trouble = ""
                 await self._work()
                 if self.end.status().state == "closed":
+                    self.ended = True
                     return
                 self.trouble = "ended"
             except asyncio.CancelledError:
@@ -71,10 +74,15 @@ class Link:
         except Exception as e:  # noqa: BLE001 - displayed as the status
             return LinkStatus("failed", explain(e))
 
+    @property
+    def name(self) -> str:
+        """Kind of source or sink, with its topic or path."""
+        where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
+        return type(self.end).__name__ + (f" {where}" if where else "")
+
     def news(self) -> Iterator[str]:
         """Yield the events since the last call: connection lost, connected again, messages refused."""
-        where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
-        name = type(self.end).__name__ + (f" {where}" if where else "")
+        name = self.name
         while self._losses:
             yield f"{name}: {self._losses.popleft()}"
         if self._told and not self.trouble:
@@ -135,9 +143,15 @@ class Outlet(Link):
         self._newest: dict[str, Correction] = {}
         self._news = asyncio.Event()
 
-    def put(self, corrections: Mapping[str, Correction]) -> None:
-        """Hand over corrections without blocking; corrections still waiting are replaced."""
+    def receives(self, target: str) -> bool:
+        """Return whether the sink receives the corrections of a target."""
+        return target in getattr(self.sink, "axes", (target,))
+
+    def put(self, corrections: Mapping[str, Correction], statuses: Mapping[str, TargetStatus] | None = None) -> None:
+        """Hand over corrections and statuses without blocking; corrections still waiting are replaced."""
         self._newest = dict(corrections)
+        if statuses is not None and isinstance(self.sink, Informing):
+            self.sink.inform(statuses)
         self._news.set()
 
     async def flush(self) -> None:
@@ -150,6 +164,8 @@ class Outlet(Link):
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(OFTEN):
                     await self._news.wait()
+            if (link := self.end.status()).state == "failed":  # found by the sink itself, with nothing to send
+                raise ThermocompError(link.reason)
             newest = self._newest if self._news.is_set() else {}
             self._news.clear()
             async with asyncio.timeout(TIMEOUT):

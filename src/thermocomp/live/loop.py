@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.ports import Confirming, Probe, Sink, Source, Suspending
+from thermocomp.core.ports import Probe, Sink, Source, Suspending, TargetStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
@@ -21,10 +21,11 @@ from thermocomp.live.ledger import ProbingLedger
 from thermocomp.live.links import SELDOM, TIMEOUT, Inlet, Link, Outlet, within
 from thermocomp.live.recorder import Recorder
 from thermocomp.live.stamps import explain_stamp
+from thermocomp.live.startvalues import WAITS, AtStart, StartValues
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.orders import order, rezero, withdraw
-from thermocomp.runtime.state import Compensated, CompensatorState, Status
+from thermocomp.runtime.orders import order, rezero, start_from, wait_for_start, withdraw
+from thermocomp.runtime.state import UNKNOWN, Compensated, CompensatorState, Status
 
 
 @dataclass
@@ -37,6 +38,9 @@ class Service:
         Path of the saved state.
     recorder : Recorder or None
         Recorder of the journal.
+    first_start, at_unknown : {'order', 'zero'}
+        If the correction in force is unknown at the first start, without a state file, or at a later one: wait for an
+        order, or start from zero.
     """
 
     compensator: Compensator
@@ -46,6 +50,8 @@ class Service:
     state_path: Path | None = None
     probes: Sequence[Probe] = ()
     recorder: Recorder | None = None
+    first_start: AtStart = "order"
+    at_unknown: AtStart = "order"
     state: CompensatorState = field(init=False)
     said: Compensated | None = field(default=None, init=False)
     events: Events = field(default_factory=Events, init=False)
@@ -54,6 +60,7 @@ class Service:
     def __post_init__(self) -> None:
         models = self.compensator.models
         self.latest = Latest(i.name for m in models for i in (*m.inputs, *(m.watch.inputs if m.watch else ())))
+        self.start_values = StartValues(self.compensator)
         self.curves, self.in_force = Curves(self.compensator), ConfirmedCorrections(self.sinks, self.clock)
         self.probings = ProbingLedger(self.compensator, self.clock, partial(self.say, "probing"))
         self.keeper = StateKeeper(self.state_path, self.compensator, self.clock, partial(self.say, "service"))
@@ -73,7 +80,8 @@ class Service:
             await asyncio.to_thread(self.recorder.journal.flush)
         self.inlets = self._make_inlets()
         for sink in self.sinks:
-            await within(TIMEOUT, self._adopt(sink))  # on failure its link reports the reason
+            await within(TIMEOUT, self.start_values.ask(sink))  # on failure its link reports the reason
+        self._begin()
         try:
             async with asyncio.TaskGroup() as group:
                 for one in self.links():
@@ -124,6 +132,16 @@ class Service:
         self.say("state", f"{target} {word}, as ordered")
         self._dirty = True
 
+    def start_from_zero(self, target: str) -> str:
+        """Start a target whose correction in force is unknown: a person states that it is zero; return why not."""
+        order = self.state.orders.get(target)
+        if order is None or order.word not in UNKNOWN:
+            return "the correction in force is known"
+        self.state = start_from(self.compensator, self.state, target, Correction(0.0))
+        self.say("state", f"{target} starts from zero, as ordered")
+        self._dirty = True
+        return ""
+
     def watch_only(self, target: str) -> None:
         """Run a target in shadow from the start, as configured."""
         self.state = order(self.compensator, self.state, target, Status("shadow", CONFIGURED))
@@ -159,8 +177,7 @@ class Service:
             tick = self.clock.tick()
             self.state = withdraw(self.compensator, self.state, tick - last)
             last = tick
-            for outlet in self.outlets:
-                outlet.put(self.state.corrections)
+            self._put(self.state.corrections)
         for outlet in self.outlets:
             await outlet.flush()
 
@@ -180,18 +197,34 @@ class Service:
         sources = [Inlet(source, source.readings, self.take) for source in self.sources]
         return sources + [Inlet(probe, probe.measurements, self.measure) for probe in self.probes]
 
-    async def _adopt(self, sink: Sink) -> None:
-        """Start from the correction in force at the controller: the saved one may be a second older."""
-        if not isinstance(sink, Confirming):
-            return
-        await sink.connect(TIMEOUT)
-        found = await sink.confirmed() or {}
-        allowed = {t: c for t, c in found.items() if t in self.state.corrections and self._allowed(t, c)}
-        self.state = self.state._replace(corrections=self.state.corrections | allowed)
+    def _begin(self) -> None:
+        """Start each target from the correction in force, or hold it until this is known."""
+        for target in self.compensator.lines:
+            known = self.start_values.of(target)
+            order = self.state.orders.get(target)
+            waits = order is not None and order.word in UNKNOWN
+            if known is not None:
+                if waits:
+                    self.state = start_from(self.compensator, self.state, target, known)
+                else:
+                    self.state = self.state._replace(corrections=self.state.corrections | {target: known})
+                if not self.keeper.resumed and (known.offset or known.slope):  # not active before it has caught up
+                    self.state = self.state._replace(away=math.nan)
+                continue
+            if waits or self.keeper.resumed or not any(o.receives(target) for o in self.outlets):
+                continue
+            first = self.keeper.first
+            if (self.first_start if first else self.at_unknown) == "zero":
+                continue
+            self.state = wait_for_start(self.state, target, WAITS[first])
+            self.say("state", f"{target} {WAITS[first].word}: {WAITS[first].reason}")
 
-    def _allowed(self, target: str, correction: Correction) -> bool:
-        ends = self.compensator.lines[target].travel
-        return max(abs(correction.at(p)) for p in ends) <= self.compensator.limits.magnitude
+    def _put(self, corrections: Mapping[str, Correction], statuses: Mapping[str, TargetStatus] | None = None) -> None:
+        """Hand corrections to all sinks, but none for a target whose correction in force is unknown."""
+        orders = self.state.orders
+        known = {t: c for t, c in corrections.items() if t not in orders or orders[t].word not in UNKNOWN}
+        for outlet in self.outlets if known else ():
+            outlet.put(known, statuses)
 
     async def _watch(self) -> None:
         """Perform the periodic work that is independent of readings: elapsed time, saving of the state."""
@@ -221,8 +254,8 @@ class Service:
 
     def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
         before, self.said = self.said, said
-        for outlet in self.outlets:
-            outlet.put(said.corrections)
+        statuses = {t: TargetStatus(s.word, s.reason, said.half_widths.get(t)) for t, s in said.states.items()}
+        self._put(said.corrections, statuses)
         for target, status in said.states.items():
             if before is None or before.states.get(target, Status("active")).word != status.word:
                 self.say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
@@ -246,6 +279,10 @@ class Service:
         """Process the correction in force reported by a controller, and the reason if there is none."""
         known = {t: c for t, c in in_force.items() if t in self.state.corrections}
         self.in_force.confirm(known)
+        for target in known.keys() & self.start_values.within_limits(known).keys():
+            if (order := self.state.orders.get(target)) is not None and order.word in UNKNOWN:
+                self.state = start_from(self.compensator, self.state, target, known[target])
+                self.say("state", f"{target} starts from {known[target].offset:+.1f} um, as the controller confirms")
         if self.recorder is not None:
             self.recorder.confirm(self.clock.now(), known)
         if isinstance(sink, Suspending):

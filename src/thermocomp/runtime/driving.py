@@ -1,5 +1,6 @@
 """Movement of corrections in a step: a driven one follows its model within the limits; others are held, then fade."""
 
+import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
@@ -9,7 +10,7 @@ from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.gate import is_number
 from thermocomp.runtime.limits import fade, limit_line
 from thermocomp.runtime.lines import DeviationLine
-from thermocomp.runtime.state import CompensatorState, Reference, Status
+from thermocomp.runtime.state import HELD, CompensatorState, Reference, Status
 
 ACTIVE = Status("active")
 
@@ -79,15 +80,14 @@ def drive(
     """
     before, order = state.corrections[target], state.orders.get(target)
     wanted = Correction.opposing(deviation)
-    if order is not None and order.word in ("holding", "suspended"):
+    if order is not None and order.word in HELD:
         return before, order
     if order is not None:  # shadow
         return limit_line(Correction(0.0), before, line.travel, travel, replace(limits, dead_band=0.0)), order
     after = limit_line(wanted, before, line.travel, travel, limits)
     if state.away is not None and _apart(wanted, after, line.travel) > max(near, limits.dead_band):
-        return after, Status(
-            "restarting", f"compensation did not run for {state.away:.0f} s; measure with the probe, or re-zero"
-        )
+        out = "an unknown time" if math.isnan(state.away) else f"{state.away:.0f} s"
+        return after, Status("restarting", f"compensation did not run for {out}; measure with the probe, or re-zero")
     return after, ACTIVE
 
 
@@ -114,7 +114,7 @@ def rest(
     idle = {t: s for t, s in state.idle.items() if t not in driven}
     for target, why in held.items():
         order = state.orders.get(target)
-        if order is not None and order.word in ("holding", "suspended"):
+        if order is not None and order.word in HELD:
             states[target] = order
             continue
         idle[target] = idle.get(target, 0.0) + travel

@@ -52,6 +52,21 @@ def order(compensator: Compensator, state: CompensatorState, target: str, status
     return state._replace(orders=orders, corrections=corrections)
 
 
+def wait_for_start(state: CompensatorState, target: str, status: Status) -> CompensatorState:
+    """Hold a target whose correction in force is unknown until `start_from`; nothing may be sent for it meanwhile."""
+    return state._replace(orders=state.orders | {target: status})
+
+
+def start_from(
+    compensator: Compensator, state: CompensatorState, target: str, in_force: Correction
+) -> CompensatorState:
+    """Start a target from the correction in force, once it is known."""
+    orders = {t: s for t, s in state.orders.items() if t != target}
+    if target in compensator.shadow:
+        orders[target] = compensator.shadow[target]
+    return state._replace(orders=orders, corrections=state.corrections | {target: in_force})
+
+
 def rezero(
     compensator: Compensator,
     state: CompensatorState,

@@ -12,7 +12,10 @@ from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.watch import WatchState
 
-Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting"]
+Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "unknown", "first start"]
+#: orders under which a correction is held; under the last two the correction in force is not known
+HELD: tuple[Word, ...] = ("holding", "suspended", "unknown", "first start")
+UNKNOWN: tuple[Word, ...] = HELD[2:]
 
 
 class Status(NamedTuple):

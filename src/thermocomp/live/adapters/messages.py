@@ -7,6 +7,7 @@ from typing import Any
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError
+from thermocomp.core.ports import TargetStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.core.shown import escape, explain_unfit
 from thermocomp.core.strictjson import parse_json
@@ -81,13 +82,55 @@ def read_measurement(payload: bytes | str, arrived: float) -> Measurement:
     )
 
 
-def write_message(corrections: Mapping[str, Correction], stamp: float) -> str:
-    """Return corrections as a message: offset [um], slope [um/m] and reference position [mm] by axis or target."""
-    table = {
-        name: {"offset_um": c.offset, "slope_um_per_m": c.slope, "reference_position_mm": c.reference_position}
-        for name, c in corrections.items()
-    }
-    return json.dumps({"time": stamp, "corrections": table}, allow_nan=False)
+def write_message(
+    corrections: Mapping[str, Correction],
+    stamp: float,
+    statuses: Mapping[str, TargetStatus] | None = None,
+    sequence: int | None = None,
+) -> str:
+    """Return corrections as a message: offset [um], slope [um/m] and reference position [mm] by axis or target.
+
+    Parameters
+    ----------
+    stamp : float
+        Time of the message [s since 1970].
+    statuses : mapping of str to TargetStatus, optional
+        Status of each target, with its reason and the half-width of its band [um].
+    sequence : int, optional
+        Number of the message since the start of the service.
+    """
+    table: dict[str, dict[str, Any]] = {}
+    for name, c in corrections.items():
+        own: dict[str, Any] = {
+            "offset_um": c.offset,
+            "slope_um_per_m": c.slope,
+            "reference_position_mm": c.reference_position,
+        }
+        if status := (statuses or {}).get(name):
+            own |= {"state": status.word, "reason": status.reason, "half_width_um": status.half_width}
+        table[name] = own
+    head = {"time": stamp} if sequence is None else {"time": stamp, "sequence": sequence}
+    return json.dumps({**head, "corrections": table}, allow_nan=False)
+
+
+def read_corrections(payload: bytes | str) -> dict[str, Correction]:
+    """Return the corrections in a message of `write_message`, by axis or target.
+
+    Raises
+    ------
+    ReadingError
+        It is not such a message.
+    """
+    example = '{"corrections": {"z_um": {"offset_um": -3.2, "slope_um_per_m": 0.0, "reference_position_mm": 0.0}}}'
+    table = _table(payload, example).get("corrections")
+    found = dict[str, Correction]()
+    for name, own in table.items() if isinstance(table, dict) else ():
+        keys = ("offset_um", "slope_um_per_m", "reference_position_mm")
+        numbers = [_number(own.get(key)) if isinstance(own, dict) else None for key in keys]
+        if None in numbers or explain_unfit(name):
+            raise ReadingError(f"a message without the numbers of a correction; expected {example}")
+        found[name] = Correction(*(n for n in numbers if n is not None))
+    return found
 
 
 def _table(payload: bytes | str, example: str) -> dict[str, Any]:

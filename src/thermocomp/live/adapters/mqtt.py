@@ -1,6 +1,7 @@
 """MQTT: incoming readings and outgoing corrections as plain JSON."""
 
 import asyncio
+import json
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
@@ -10,12 +11,12 @@ import aiomqtt
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import ReadingError, ThermocompError
-from thermocomp.core.ports import LinkStatus
+from thermocomp.core.ports import LinkStatus, TargetStatus
 from thermocomp.core.reading import Reading
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.inbox import Inbox
-from thermocomp.live.adapters.messages import read_message, write_message
+from thermocomp.live.adapters.messages import read_corrections, read_message, write_message
 
 
 @dataclass(kw_only=True)
@@ -33,7 +34,7 @@ class Broker:
         await self.close()
         self._connection.to("connecting")
         try:
-            client = aiomqtt.Client(self.host, self.port, timeout=timeout, queue_type=self._queue())
+            client = aiomqtt.Client(self.host, self.port, timeout=timeout, queue_type=self._queue(), will=self._will())
             async with asyncio.timeout(timeout):
                 await client.__aenter__()
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
@@ -45,6 +46,10 @@ class Broker:
 
     def _queue(self) -> type[asyncio.Queue[aiomqtt.Message]] | None:
         """Return the queue of incoming messages; default: that of the library."""
+        return None
+
+    def _will(self) -> aiomqtt.Will | None:
+        """Return the message that the broker publishes if the connection breaks; default: none."""
         return None
 
     def status(self) -> LinkStatus:
@@ -142,11 +147,111 @@ async def _wait_for_loss(client: aiomqtt.Client) -> None:
 
 @dataclass(kw_only=True)
 class MqttSink(Broker):
-    """Sink that publishes corrections on an MQTT topic."""
+    """Sink that publishes corrections on an MQTT topic, and whether it runs on the topic with ``/status`` appended.
+
+    Both messages are retained: a consumer that connects later gets them at once. If the connection breaks, the broker
+    publishes the status ``lost``.
+
+    Parameters
+    ----------
+    confirm_topic : str
+        Topic on which the controller reports the corrections in force, in the form in which they are published; empty:
+        it does not.
+    """
+
+    confirm_topic: str = ""
+    _statuses: dict[str, TargetStatus] = field(default_factory=dict, init=False, repr=False)
+    _sequence: int = field(default=0, init=False, repr=False)
+    _before: dict[str, Correction] | None = field(default=None, init=False, repr=False)
+    _reported: dict[str, Correction] | None = field(default=None, init=False, repr=False)
+    _listening: asyncio.Task[None] | None = field(default=None, init=False, repr=False)
+
+    def inform(self, statuses: Mapping[str, TargetStatus]) -> None:
+        """Store the statuses for the next corrections."""
+        self._statuses = dict(statuses)
+
+    def _will(self) -> aiomqtt.Will:
+        return aiomqtt.Will(self._status_topic, _status("lost", "the connection of the compensator broke"), 1, True)
+
+    @property
+    def _status_topic(self) -> str:
+        return f"{self.topic}/status"
+
+    async def connect(self, timeout: float) -> None:
+        """Connect and read the last own message, or raise `ThermocompError` with the reason."""
+        await super().connect(timeout)
+        client = self._connected()
+        self._before = self._reported = None
+        try:
+            async with asyncio.timeout(timeout):
+                for topic in filter(None, (self.topic, self.confirm_topic)):
+                    await client.subscribe(topic, qos=1)
+                await client.publish(self._status_topic, _status("running"), qos=1, retain=True)
+        except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
+            await super().close()
+            raise self._fail(e) from e
+        self._listening = asyncio.create_task(self._listen(client))
+
+    async def _listen(self, client: aiomqtt.Client) -> None:
+        """Read the retained message of an earlier run, and what the controller confirms, until the connection is lost.
+
+        Our own messages are of no interest: the subscription ends with the first of them.
+        """
+        try:
+            async for message in client.messages:
+                payload = message.payload if isinstance(message.payload, bytes | str) else b""
+                try:
+                    found = read_corrections(payload)
+                except ReadingError:
+                    continue
+                if message.topic.matches(self.topic):
+                    if message.retain:
+                        self._before = found
+                    await client.unsubscribe(self.topic)
+                elif not message.retain:
+                    self._reported = found
+        except (aiomqtt.MqttError, OSError, ValueError) as e:
+            if client is self._client:
+                self._fail(e)
+
+    async def last_sent(self) -> Mapping[str, Correction] | None:
+        """Return the corrections in the retained message of an earlier run; None without one."""
+        for _ in range(20):
+            if self._before is not None:
+                break
+            await asyncio.sleep(0.05)
+        return self._before
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
-        """Publish corrections, or raise `ThermocompError` with the reason."""
+        """Publish corrections with their statuses, or raise `ThermocompError` with the reason."""
+        self._sequence += 1
+        text = write_message(corrections, time.time(), self._statuses, self._sequence)
         try:
-            await self._connected().publish(self.topic, write_message(corrections, time.time()), qos=0, timeout=5.0)
+            await self._connected().publish(self.topic, text, qos=0, retain=True, timeout=5.0)
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             raise self._fail(e) from e
+
+    async def close(self) -> None:
+        """Publish that the compensator has stopped, and close the connection; idempotent."""
+        listening, self._listening = self._listening, None
+        if listening is not None:
+            listening.cancel()
+        if self._client is not None and self._connection.now.state == "connected":
+            with suppress(aiomqtt.MqttError, OSError, TimeoutError, ValueError):
+                told = _status("stopped", "corrections are unchanged")
+                await self._client.publish(self._status_topic, told, qos=1, retain=True, timeout=1.0)
+        await super().close()
+
+
+@dataclass(kw_only=True)
+class ConfirmedMqttSink(MqttSink):
+    """The same, with a topic on which the controller confirms."""
+
+    async def confirmed(self) -> Mapping[str, Correction] | None:
+        """Return the corrections in force that the controller has reported since the last call; None: no report."""
+        found, self._reported = self._reported, None
+        return found
+
+
+def _status(state: str, reason: str = "") -> str:
+    return json.dumps({"state": state, "reason": reason, "time": time.time()})

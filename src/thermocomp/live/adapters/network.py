@@ -39,8 +39,11 @@ class OnBroker:
             raise SettingError(f"port = {self.port}: expected a port from 1 to 65535")
 
     def hears(self, other: "OnBroker") -> bool:
-        """Return whether messages published to the topic of `other` arrive on this topic, according to their names."""
-        levels, topic = self.topic.split("/"), other.topic.split("/")
+        """Return whether messages that `other` publishes arrive on this topic, according to their names."""
+        return self._hears(other, other.topic) or (other.published and self._hears(other, f"{other.topic}/status"))
+
+    def _hears(self, other: "OnBroker", published: str) -> bool:
+        levels, topic = self.topic.split("/"), published.split("/")
         levels = levels[2:] if levels[0] == "$share" else levels
         fits = all(level in ("+", "#", found) for level, found in zip(levels, topic, strict=False))
         long = len(topic) >= len(levels) - 1 if levels[-1] == "#" else len(topic) == len(levels)
@@ -100,16 +103,30 @@ class MqttOut(OnBroker):
     ----------
     topic, host, port
         As for `OnBroker`.
+    confirm_topic : str
+        Topic on which the controller reports the corrections in force, in the form of the published message; empty: it
+        does not.
     """
 
     published: ClassVar[bool] = True
     kind: Literal["mqtt"]
+    confirm_topic: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.confirm_topic:
+            if why := explain_topic(self.confirm_topic, published=True):
+                raise SettingError(f"confirm_topic = {self.confirm_topic[:200]!r}: {why}")
+            if self.confirm_topic in (self.topic, f"{self.topic}/status"):
+                raise SettingError(f"confirm_topic = {self.confirm_topic[:200]!r}: the service publishes to this topic")
 
     def open(self, folder: Path) -> Sink:  # noqa: ARG002 - part of the interface
         """Create the sink; it connects later."""
-        from thermocomp.live.adapters.mqtt import MqttSink
+        from thermocomp.live.adapters.mqtt import ConfirmedMqttSink, MqttSink
 
-        return MqttSink(topic=self.topic, host=self.host, port=self.port)
+        if not self.confirm_topic:
+            return MqttSink(topic=self.topic, host=self.host, port=self.port)
+        return ConfirmedMqttSink(topic=self.topic, host=self.host, port=self.port, confirm_topic=self.confirm_topic)
 
 
 def explain_topic(topic: str, *, published: bool) -> str:

@@ -9,11 +9,11 @@ from collections.abc import AsyncIterator, Generator, Iterator, Mapping, Sequenc
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, ClassVar
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import InputError, ThermocompError
-from thermocomp.core.ports import LinkStatus
+from thermocomp.core.ports import LinkStatus, TargetStatus
 from thermocomp.core.reading import Reading
 from thermocomp.core.shown import explain_unfit
 from thermocomp.files.draft import write_text
@@ -135,8 +135,14 @@ class SimulatedSource(Played):
 class FileSink:
     """Sink that writes the corrections in force to a file, replaced atomically each time."""
 
+    only_sent: ClassVar[bool] = True
     path: Path
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)
+    _statuses: dict[str, TargetStatus] = field(default_factory=dict, init=False, repr=False)
+
+    def inform(self, statuses: Mapping[str, TargetStatus]) -> None:
+        """Store the statuses for the next corrections."""
+        self._statuses = dict(statuses)
 
     async def connect(self, timeout: float) -> None:  # noqa: ARG002 - part of the interface
         """Check that the folder of the file exists."""
@@ -148,7 +154,7 @@ class FileSink:
 
     async def apply(self, corrections: Mapping[str, Correction]) -> None:
         """Write the corrections to the file, or raise `ThermocompError` with the reason."""
-        text = write_message(corrections, time.time()) + "\n"
+        text = write_message(corrections, time.time(), self._statuses) + "\n"
         try:
             await asyncio.to_thread(write_text, text, self.path, overwrite=True)
         except (OSError, ThermocompError) as e:

@@ -156,6 +156,7 @@ models = ["model.json"]
 state = "state.json"
 speed = {speed}.0
 own_compensation = "off"
+first_start = "zero"
 
 [[sources]]
 kind = "simulated"

@@ -1,4 +1,4 @@
-"""Manual commands: run, hold, shadow, rezero, roll back; authorised by the token."""
+"""Manual commands: start, run, hold, shadow, rezero, roll back; authorised by the token."""
 
 from typing import Annotated, Literal
 
@@ -11,7 +11,7 @@ from thermocomp.core.strictjson import parse_json
 from thermocomp.live.loop import Service
 from thermocomp.live.page.doors import Json
 from thermocomp.live.page.pages import Board
-from thermocomp.runtime.state import Status
+from thermocomp.runtime.state import UNKNOWN, Status
 
 
 class PageOrder(BaseModel):
@@ -19,7 +19,7 @@ class PageOrder(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
     target: Annotated[str, Field(max_length=200)]
-    do: Literal["run", "hold", "shadow", "rezero", "roll back"]
+    do: Literal["start", "run", "hold", "shadow", "rezero", "roll back"]
 
 
 def make_router(board: Board) -> APIRouter:
@@ -58,7 +58,11 @@ def read_order(body: bytes) -> PageOrder:
 
 def give(service: Service, wanted: PageOrder) -> str:
     """Carry out a command; return the reason if impossible, else an empty string."""
-    target = wanted.target
+    target, waiting = wanted.target, service.state.orders.get(wanted.target)
+    if wanted.do == "start":
+        return service.start_from_zero(target)
+    if waiting is not None and waiting.word in UNKNOWN:
+        return f"{waiting.word}: {waiting.reason}"
     if wanted.do == "rezero":
         service.rezero(target, "by hand, on the page")
     elif wanted.do == "roll back":

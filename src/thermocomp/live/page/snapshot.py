@@ -1,6 +1,7 @@
 """State of a service as plain numbers and text, for the page and for JSON."""
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from thermocomp.core.ports import Probe
@@ -8,6 +9,13 @@ from thermocomp.live.links import Link, Outlet
 from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
 from thermocomp.runtime.lines import DeviationLine
+from thermocomp.runtime.state import UNKNOWN
+
+#: states of a target, the one that needs attention most first
+ORDER = (
+    *("unknown", "first start", "not confirmed", "fading", "holding", "suspended", "not sent", "restarting", "shadow"),
+    *("sent, not confirmed", "active"),
+)
 
 
 def snapshot(service: Service, settled: float) -> dict[str, Any]:
@@ -25,13 +33,24 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
     """
     said, now, tick = service.said, service.clock.now(), service.clock.tick()
     failed = said.failed if said else {}
+    watched = {name for watch in service.compensator.watches for name in watch.names}
+
+    def word(name: str, age: float) -> str:
+        if age > service.compensator.limits.reading_age:
+            return "stale"
+        return "good" if name in watched else "not watched"
+
+    targets = [_target(service, name, line, settled) for name, line in service.compensator.lines.items()]
+    alarms = list(find_alarms(service))
     return {
         "time": now,
+        "state": _overall(targets, alarms),
+        "alarms": alarms,
         "speed": service.clock.speed,
         "settled_um": settled,
-        "targets": [_target(service, name, line, settled) for name, line in service.compensator.lines.items()],
+        "targets": targets,
         "sensors": [
-            {"name": name, "value": value, "age_s": tick - at, "state": failed.get(name, "good")}
+            {"name": name, "value": value, "age_s": tick - at, "state": failed.get(name) or word(name, tick - at)}
             for name, (value, at) in sorted(service.latest.items())
         ],
         "missing": sorted(failed.keys() - service.latest.keys()),
@@ -42,6 +61,42 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
         "residuals": [checked._asdict() for checked in service.probings.checked],
         "events": [{"time": e.time, "kind": e.kind, "text": e.text} for e in reversed(service.events)],
     }
+
+
+def find_alarms(service: Service) -> Iterator[str]:
+    """Yield what needs attention: lost links, corrections that differ, sensors, time stamps, files not written."""
+    said = service.said
+    for name, line in service.compensator.lines.items():
+        there = service.in_force.at_controller(name, service.outlets)
+        order = service.state.orders.get(name)
+        if order is not None and order.word in UNKNOWN:
+            yield f"{name}: {order.word}: {order.reason}"
+        elif there.word == "not confirmed" and name not in service.compensator.shadow and line is not None:
+            yield f"{name}: not confirmed: {there.reason}"
+    for one in service.links():
+        if (link := one.status()).state == "failed" or (link.state == "closed" and link.reason and not one.ended):
+            yield f"{one.name}: {link.reason}"
+    if service.untimely:
+        yield f"readings are not used: {service.untimely}"
+    if said is not None and said.rejected:
+        yield f"the last reading was rejected: {said.rejected}"
+    for name, fault in (said.failed if said else {}).items():
+        yield f"{name} {fault}"
+    if service.keeper.not_saved and service.keeper.configured:
+        yield f"the state is not saved: {service.keeper.not_saved}"
+    if service.recorder is not None and (trouble := service.recorder.journal.status().reason):
+        yield f"journal: {trouble}"
+
+
+def _overall(targets: Sequence[dict[str, Any]], alarms: Sequence[str]) -> dict[str, str]:
+    """Return one state of the whole service, with its reason: that of the target that is worst off, or an alarm."""
+    running = [t for t in targets if t["runs"]] or list(targets)
+    if not running:
+        return {"word": "restarting", "reason": "there is no target"}
+    worst = min(running, key=lambda t: ORDER.index(t["state"]) if t["state"] in ORDER else 0)
+    if worst["state"] in ("active", "sent, not confirmed") and alarms:
+        return {"word": f"{worst['state']}, with an alarm", "reason": alarms[0]}
+    return {"word": worst["state"], "reason": f"{worst['name']}: {worst['reason']}" if worst["reason"] else ""}
 
 
 def curves(service: Service) -> dict[str, list[float | None]]:
@@ -59,10 +114,21 @@ def _target(service: Service, name: str, line: DeviationLine, settled: float) ->
     rows = [r for r in service.curves if f"{name} predicted" in r]
     left = minutes_until([r["time"] for r in rows], [r[f"{name} predicted"] for r in rows], settled)
     learned = service.state.learned.get(name)
+    there = service.in_force.at_controller(name, service.outlets)
+    word: str = status.word if status else "restarting"
+    reason = status.reason if status else "waits for its first reading"
+    if word == "active" and there.word != "confirmed":
+        word, reason = there.word, there.reason
     return {
         "name": name,
-        "state": status.word if status else "restarting",
-        "reason": status.reason if status else "waits for its first reading",
+        "state": word,
+        "reason": reason,
+        "at_controller": {
+            "state": there.word,
+            "reason": there.reason,
+            "correction_um": there.correction.offset if there.correction else None,
+            "age_s": there.age,
+        },
         "deviation_um": deviation.offset if deviation else None,
         "half_width_um": said.half_widths.get(name) if said else None,
         "correction_um": correction.offset,
@@ -88,4 +154,10 @@ def _words(minutes: float) -> str:
 def _link(one: Link) -> dict[str, Any]:
     kind = "sink" if isinstance(one, Outlet) else "probe" if isinstance(one.end, Probe) else "source"
     status = one.status()
-    return {"kind": kind, "name": type(one.end).__name__, "state": status.state, "reason": status.reason}
+    return {
+        "kind": kind,
+        "name": type(one.end).__name__,
+        "state": status.state,
+        "reason": status.reason,
+        "replaced": getattr(one.end, "replaced", 0),
+    }

@@ -87,22 +87,22 @@ function table(id, rows) {
 
 function show(state) {
   put(at(document, "#clock"), "machine " + clock(state.time) + (state.speed === 1 ? "" : `, at ${state.speed} times real time`));
-  const silent = at(document, "#alarm"), bad = state.links.filter(l => l.state === "failed");
-  const failed = state.sensors.filter(s => s.state !== "good").map(s => `${s.name} ${s.state}`).concat(state.missing.map(n => n + " missing"));
-  const alarms = [...failed, ...bad.map(l => l.name + ": " + l.reason)];
-  silent.hidden = !alarms.length;
-  put(silent, alarms.join("; "));
+  const overall = at(document, "#overall"), silent = at(document, "#alarm");
+  put(overall, state.state.word + (state.state.reason ? ": " + state.state.reason : ""));
+  silent.hidden = !state.alarms.length;
+  put(silent, state.alarms.join("; "));
   for (const t of state.targets) {
     const card = at(document, `[data-target="${CSS.escape(t.name)}"]`), word = at(card, ".word");
-    put(word, t.state); word.className = "word " + t.state;
+    put(word, t.state); word.className = "word " + t.state.replace(/\W+/g, "-");
     put(at(card, ".reason"), t.reason);
     put(at(card, ".correction"), um(t.correction_um) + (t.slope_um_per_m ? `, ${um(t.slope_um_per_m)}/m` : ""));
+    put(at(card, ".there"), (t.at_controller.correction_um === null ? "" : um(t.at_controller.correction_um) + ", ") + t.at_controller.state);
     put(at(card, ".deviation"), um(t.deviation_um) + (t.half_width_um === null ? "" : ` ± ${t.half_width_um.toFixed(1)}`));
     put(at(card, ".settled"), String(state.settled_um));
     put(at(card, ".settling"), t.settling);
     put(at(card, ".reference"), t.reference ? `${clock(t.reference.time)}: ${t.reference.why}` : "not known yet");
   }
-  table("#sensors", state.sensors.map(s => [s.name, s.value.toFixed(2), [s.state, s.state === "good" ? "active" : "failed"]])
+  table("#sensors", state.sensors.map(s => [s.name, s.value.toFixed(2), [s.state, s.state === "good" ? "active" : s.state === "not watched" ? "" : "failed"]])
     .concat(state.missing.map(n => [n, "–", ["missing", "failed"]])));
   put(at(document, "#others"), state.left_out ? `and ${state.left_out}${state.left_out < 10000 ? "" : " or"} more channels that no model uses` : "");
   table("#links", state.links.map(l => [l.name, [l.state, l.state], l.reason]));

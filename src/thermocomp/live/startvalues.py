@@ -1,0 +1,55 @@
+"""Corrections in force when the service starts: confirmed by the controller, or as last sent by an earlier run."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from thermocomp.core.correction import Correction
+from thermocomp.core.ports import Confirming, Remembering, Sink
+from thermocomp.live.inforce import confirms
+from thermocomp.live.links import TIMEOUT
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.state import Status
+
+#: what is done if the correction in force is unknown
+AtStart = Literal["order", "zero"]
+
+#: status of a target that waits: at a later start, and at the first one
+WAITS = {
+    False: Status("unknown", "the correction in force is unknown: remove it at the controller, then order 'start'"),
+    True: Status(
+        "first start", "there is no state of an earlier run: check that no correction is in force, then order 'start'"
+    ),
+}
+
+
+class StartValues:
+    """Corrections in force at the start, as far as sinks know them."""
+
+    def __init__(self, compensator: Compensator) -> None:
+        self._compensator = compensator
+        self._confirmed, self._sent = dict[str, Correction](), dict[str, Correction]()
+
+    async def ask(self, sink: Sink) -> None:
+        """Connect a sink and ask it for the corrections in force."""
+        if not isinstance(sink, Confirming | Remembering):
+            return
+        await sink.connect(TIMEOUT)
+        if isinstance(sink, Confirming):
+            found = self.within_limits(await sink.confirmed() or {})
+            if confirms(sink):
+                self._confirmed |= found
+            else:
+                self._sent |= found
+        if isinstance(sink, Remembering):
+            self._sent |= self.within_limits(await sink.last_sent() or {})
+
+    def of(self, target: str) -> Correction | None:
+        """Return the correction in force, confirmed or else as last sent; None if no sink knows it."""
+        return self._confirmed.get(target, self._sent.get(target))
+
+    def within_limits(self, corrections: Mapping[str, Correction]) -> dict[str, Correction]:
+        """Return the corrections of known targets that do not exceed the limits: others are not ours."""
+        lines, most = self._compensator.lines, self._compensator.limits.magnitude
+        return {
+            t: c for t, c in corrections.items() if t in lines and max(abs(c.at(p)) for p in lines[t].travel) <= most
+        }
