@@ -41,6 +41,7 @@ models = ["model.json"]
 state = "state.json"
 speed = {factor}
 own_compensation = "off"
+first_start = "zero"
 
 [limits]
 magnitude = 100.0

@@ -23,6 +23,7 @@ RATE = 0.5
 CONFIG = """
 models = ["model.json"]
 state = "state.json"
+first_start = "zero"
 
 [limits]
 rate = {rate}

@@ -124,7 +124,7 @@ async def shown(service: Service) -> list[dict[str, str]]:
 @pytest.mark.parametrize("where", ["connect", "begin", "middle", "status"])
 def test_a_source_that_fails_stops_nothing(where: str, error: BaseException, tmp_path: Path) -> None:
     bad, probe, good, path = Bad(error, where), Bad(error, where), Given(), tmp_path / "out.json"
-    service = Service(machine(), [bad, good], [FileSink(path=path)], probes=[probe])
+    service = Service(machine(), [bad, good], [FileSink(path=path)], probes=[probe], first_start="zero")
 
     async def work() -> None:
         say(bad, 20.0)
@@ -155,7 +155,7 @@ def test_a_source_that_fails_stops_nothing(where: str, error: BaseException, tmp
 @pytest.mark.parametrize("where", ["connect", "apply", "confirmed", "close"])
 def test_a_sink_that_fails_stops_nothing(where: str, error: BaseException, tmp_path: Path) -> None:
     source, bad, path, state = Given(), BadSink(error, where), tmp_path / "out.json", tmp_path / "state.json"
-    service = Service(machine(), [source], [bad, FileSink(path=path)], state_path=state)
+    service = Service(machine(), [source], [bad, FileSink(path=path)], state_path=state, first_start="zero")
 
     async def work() -> None:
         for k in range(3):
@@ -205,6 +205,7 @@ def test_a_connection_that_hangs_is_tried_again_and_said(monkeypatch: pytest.Mon
             "name": "Hanging",
             "state": "failed",
             "reason": "no answer in time",
+            "replaced": 0,
         }
 
     asyncio.run(running(service, work))
@@ -220,7 +221,9 @@ def test_a_broker_that_cannot_be_is_the_trouble_of_its_link(topic: str, host: st
     odd = MqttSource(topic=topic, host=host), MqttSink(topic=topic, host=host)
     day = tmp_path / "day.csv"
     day.write_bytes(b"time_s,t\n0,\xff\n")
-    service = Service(machine(), [odd[0], source, ReplaySource(path=day)], [odd[1], FileSink(path=path)])
+    service = Service(
+        machine(), [odd[0], source, ReplaySource(path=day)], [odd[1], FileSink(path=path)], first_start="zero"
+    )
 
     async def work() -> None:
         say(source, 20.0)
@@ -243,7 +246,7 @@ def test_a_broker_that_cannot_be_is_the_trouble_of_its_link(topic: str, host: st
 def test_a_file_of_corrections_that_is_none_stops_nothing(content: str, tmp_path: Path) -> None:
     path, source = tmp_path / "out.json", Given()
     path.write_text(content, encoding="utf-8", errors="surrogatepass")
-    service = Service(machine(), [source], [FileSink(path=path)])
+    service = Service(machine(), [source], [FileSink(path=path)], first_start="zero")
 
     async def work() -> None:
         say(source, 20.0)

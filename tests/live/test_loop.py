@@ -100,7 +100,7 @@ async def running(service: Service, work: object) -> None:
 
 def test_readings_go_in_and_corrections_come_out(tmp_path: Path) -> None:
     source, path = Given(), tmp_path / "corrections.json"
-    service = Service(machine(), [source], [FileSink(path=path)])
+    service = Service(machine(), [source], [FileSink(path=path)], first_start="zero")
 
     async def work() -> None:
         for k in range(3):
@@ -116,7 +116,7 @@ def test_readings_go_in_and_corrections_come_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize("hangs", [True, False])
 def test_one_dead_sink_and_a_lost_source_stop_nothing(hangs: bool, tmp_path: Path) -> None:
     first, second, broken, path = Given(), Given(), Broken(hangs=hangs), tmp_path / "corrections.json"
-    service = Service(machine(), [first, second], [broken, FileSink(path=path)])
+    service = Service(machine(), [first, second], [broken, FileSink(path=path)], first_start="zero")
 
     async def work() -> None:
         say(second, 20.0)
@@ -188,7 +188,7 @@ def test_a_file_of_others_is_not_written_over(content: str | None, tmp_path: Pat
 
 def test_it_fades_out_without_a_reading_and_the_next_start_runs(tmp_path: Path) -> None:
     path, limits = tmp_path / "state.json", Limits(rate=4.0)
-    service = Service(machine(limits), [], [FileSink(path=tmp_path / "out.json")], state_path=path)
+    service = Service(machine(limits), [], [FileSink(path=tmp_path / "out.json")], state_path=path, first_start="zero")
     for t in (20.0, 20.5):
         service.take(Reading(time.time(), {"t": t}))
         time.sleep(0.3)
@@ -219,7 +219,7 @@ class Odd(Broken):
 
 def test_a_sink_that_fails_in_an_odd_way_stops_nothing(tmp_path: Path) -> None:
     source, path = Given(), tmp_path / "out.json"
-    service = Service(machine(), [source], [Odd(hangs=False), FileSink(path=path)])
+    service = Service(machine(), [source], [Odd(hangs=False), FileSink(path=path)], first_start="zero")
 
     async def work() -> None:
         for k in range(2):
@@ -281,7 +281,8 @@ def broker(tmp_path: Path) -> object:
 
 def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
     source = MqttSource(topic="m/7", port=broker.port, names={"temperature": "t"})
-    service = Service(machine(), [source], [MqttSink(topic="m/7/corrections", port=broker.port)])
+    sink = MqttSink(topic="m/7/corrections", port=broker.port)
+    service = Service(machine(), [source], [sink], first_start="zero")
     heard: list[float] = []
 
     async def listen() -> None:
@@ -322,7 +323,7 @@ def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
 
 def test_a_stop_before_the_first_reading_leaves_what_is_in_force(tmp_path: Path) -> None:
     path = tmp_path / "out.json"
-    first = Service(machine(), [], [FileSink(path=path)])
+    first = Service(machine(), [], [FileSink(path=path)], first_start="zero")
     first.take(Reading(time.time(), {"t": 20.0}))
     first.take(Reading(time.time(), {"t": 23.0}))
 
@@ -332,7 +333,7 @@ def test_a_stop_before_the_first_reading_leaves_what_is_in_force(tmp_path: Path)
     asyncio.run(running(first, briefly))
     before = json.loads(path.read_text())["corrections"]
     assert before["z_um"]["offset_um"] == -6.0
-    asyncio.run(running(Service(machine(), [Given()], [FileSink(path=path)]), briefly))
+    asyncio.run(running(Service(machine(), [Given()], [FileSink(path=path)], first_start="zero"), briefly))
     assert json.loads(path.read_text())["corrections"] == before
 
 
@@ -374,6 +375,9 @@ class Controller(Broken):
     async def confirmed(self) -> dict[str, Correction] | None:
         return None if self.offset is None else {"z_um": Correction(self.offset)}
 
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected")
+
     def suspended(self) -> dict[str, str]:
         return self.away
 
@@ -383,7 +387,7 @@ class Controller(Broken):
 
 def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> None:
     source, controller = Given(), Controller()
-    service = Service(machine(), [source], [controller, FileSink(path=tmp_path / "out.json")])
+    service = Service(machine(), [source], [controller, FileSink(path=tmp_path / "out.json")], first_start="zero")
 
     async def work() -> None:
         for k in range(4):

@@ -3,7 +3,7 @@
 import asyncio
 import json
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 
 import httpx
@@ -12,8 +12,9 @@ from fastapi import FastAPI
 from test_loop import Given, machine
 from watchedmachine import failing, watched_model
 
-from thermocomp.core.correction import Limits
+from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.loop import Service
@@ -50,9 +51,14 @@ def test_what_is_shown_is_what_is_in_force() -> None:
             fed(service, 20.0, 21.5)
             state = (await client.get("/api/state")).json()
             (target,) = state["targets"]
-            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "active", -3.0)
+            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "not sent", -3.0)
             assert target["deviation_um"] == 3.0
-            assert state["sensors"][0] | {"age_s": 0} == {"name": "t", "value": 21.5, "age_s": 0, "state": "good"}
+            assert state["sensors"][0] | {"age_s": 0} == {
+                "name": "t",
+                "value": 21.5,
+                "age_s": 0,
+                "state": "not watched",
+            }
             assert state["counts"] == {"readings": 2, "rejected": 0}
             assert (await client.get("/api/curves")).json()["z_um predicted"] == [0.0]
             html = await client.get("/")
@@ -214,13 +220,35 @@ class Told(ServiceClock):
         return stamp
 
 
+class Echo:
+    """A controller that has the corrections as soon as they are sent."""
+
+    def __init__(self) -> None:
+        self.has = {"z_um": Correction(0.0)}
+
+    async def connect(self, timeout: float) -> None:
+        """Connect."""
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        self.has |= corrections
+
+    async def confirmed(self) -> dict[str, Correction]:
+        return self.has
+
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected")
+
+    async def close(self) -> None:
+        """Close."""
+
+
 def test_in_a_browser(tmp_path: Path) -> None:
     playwright = pytest.importorskip("playwright.async_api")
     if not Path("/usr/bin/chromium").exists():
         pytest.skip("Chromium is not installed (Debian package chromium)")
     model, day, source = watched_model(), failing(), Given()
     clock = Told()
-    service = Service(Compensator.of([model], Limits(rate=1e9), watching=True), [source], [], clock)
+    service = Service(Compensator.of([model], Limits(rate=1e9), watching=True), [source], [Echo()], clock)
 
     async def feed(rows: range, missing: str = "") -> None:
         for k in rows:

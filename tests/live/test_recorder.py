@@ -20,7 +20,7 @@ from thermocomp.runtime.state import Status
 
 def recorded(folder: Path, own: str = "off") -> tuple[Service, Given]:
     source, compensator = Given(), machine()
-    service = Service(compensator, [source], [FileSink(path=folder / "corrections.json")])
+    service = Service(compensator, [source], [FileSink(path=folder / "corrections.json")], first_start="zero")
     kept = {"t9_C": "temperature"}
     service.recorder = Recorder(folder / "live.db", compensator, own, service.clock, JournalLimits(), kept)  # type: ignore[arg-type]
     return service, source

@@ -85,7 +85,13 @@ class Stack:
     def init(self) -> StackState:
         """Return the state of a machine that has just been zeroed: see `ErrorModel.init`."""
         nowhere = np.zeros(len(self._zero), dtype=np.bool_)
-        return StackState(self._zero.copy(), None, np.zeros(len(self.models)), nowhere, np.empty(0))
+        return StackState(
+            reference=self._zero.copy(),
+            memory=None,
+            deviation=np.zeros(len(self.models)),
+            outside=nowhere,
+            outputs=np.empty(0),
+        )
 
     def step(self, state: StackState, values: FloatArray, dt: float) -> tuple[StackState, FloatArray]:
         """Process one reading and return the deviations at its time.
@@ -119,7 +125,8 @@ class Stack:
         deviation = found[..., : len(self.models)].copy()
         if self._joint or outside.any():
             deviation = self._supported(state.deviation, deviation, change, clipped)
-        return StackState(reference, memory, deviation, outside, found), deviation
+        after = StackState(reference=reference, memory=memory, deviation=deviation, outside=outside, outputs=found)
+        return after, deviation
 
     def _changes(self, reference: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the values of all taps minus their reference, and these clipped to the trained ranges."""

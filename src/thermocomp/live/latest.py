@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping
 
 #: number of unused names kept for display; further names are counted up to a maximum
 KEPT, COUNTED = 64, 10_000
+#: two clocks are read one after the other: values that are older by no more than this are of the same time [s]
+JITTER = 0.01
 
 
 class Latest(dict[str, tuple[float, float]]):
@@ -54,6 +56,6 @@ class Latest(dict[str, tuple[float, float]]):
         for name, value in values.items():
             if name in self.used or name in self or name in new:
                 before = self.get(name)
-                if before is None or before[1] <= at:
+                if before is None or before[1] <= at + JITTER:
                     self[name] = (value, at)
         return first

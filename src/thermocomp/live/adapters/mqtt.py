@@ -31,7 +31,7 @@ class Broker:
 
     async def connect(self, timeout: float) -> None:
         """Connect, or raise `ThermocompError` with the reason after `timeout` seconds."""
-        await self.close()
+        await self._hang_up()
         self._connection.to("connecting")
         try:
             client = aiomqtt.Client(self.host, self.port, timeout=timeout, queue_type=self._queue(), will=self._will())
@@ -58,6 +58,9 @@ class Broker:
 
     async def close(self) -> None:
         """Close the connection; idempotent."""
+        await self._hang_up()
+
+    async def _hang_up(self) -> None:
         client, self._client = self._client, None
         if client is not None:
             with suppress(aiomqtt.MqttError, OSError, TimeoutError):  # connection lost earlier
@@ -188,7 +191,7 @@ class MqttSink(Broker):
                     await client.subscribe(topic, qos=1)
                 await client.publish(self._status_topic, _status("running"), qos=1, retain=True)
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
-            await super().close()
+            await self._hang_up()
             raise self._fail(e) from e
         self._listening = asyncio.create_task(self._listen(client))
 
@@ -233,14 +236,17 @@ class MqttSink(Broker):
 
     async def close(self) -> None:
         """Publish that the compensator has stopped, and close the connection; idempotent."""
-        listening, self._listening = self._listening, None
-        if listening is not None:
-            listening.cancel()
         if self._client is not None and self._connection.now.state == "connected":
             with suppress(aiomqtt.MqttError, OSError, TimeoutError, ValueError):
                 told = _status("stopped", "corrections are unchanged")
                 await self._client.publish(self._status_topic, told, qos=1, retain=True, timeout=1.0)
-        await super().close()
+        await self._hang_up()
+
+    async def _hang_up(self) -> None:
+        listening, self._listening = self._listening, None
+        if listening is not None:
+            listening.cancel()
+        await super()._hang_up()
 
 
 @dataclass(kw_only=True)

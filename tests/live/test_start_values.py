@@ -1,0 +1,246 @@
+"""A start from what is in force: confirmed, or last sent, or saved; otherwise nothing is sent until an order."""
+
+import asyncio
+import itertools
+import json
+import time
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import aiomqtt
+import pytest
+from broker import Mosquitto
+from test_loop import Controller, Given, machine, running, say, until
+
+from thermocomp.core.correction import Correction, Limits
+from thermocomp.live.adapters.mqtt import ConfirmedMqttSink, MqttSink
+from thermocomp.live.adapters.plain import FileSink
+from thermocomp.live.loop import Service
+from thermocomp.live.page.orders import PageOrder, give
+from thermocomp.live.page.snapshot import snapshot
+
+SLOW = Limits(rate=2.0)  # um/s
+TOPIC = "m/7/corrections"
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Any:
+    found = Mosquitto(tmp_path)
+    found.start()
+    yield found
+    found.kill()
+
+
+def service(sink: Any, state: Path | None, **options: Any) -> tuple[Service, Given]:
+    source = Given()
+    return Service(machine(SLOW), [source], [sink], state_path=state, **options), source
+
+
+async def heat(own: Service, source: Given, degrees: float, seconds: float) -> None:
+    """Feed a zero, then a temperature above it."""
+    end, first = time.monotonic() + seconds, True
+    while time.monotonic() < end:
+        say(source, 20.0 if first else 20.0 + degrees)
+        first = False
+        await asyncio.sleep(0.05)
+
+
+async def listen(port: int, heard: list[tuple[float, dict[str, Any]]]) -> None:
+    async with aiomqtt.Client("127.0.0.1", port) as client:
+        await client.subscribe(f"{TOPIC}/#")
+        async for message in client.messages:
+            assert isinstance(message.payload, bytes)
+            heard.append((time.monotonic(), {"topic": str(message.topic), **json.loads(message.payload)}))
+
+
+def offsets(heard: list[tuple[float, dict[str, Any]]]) -> list[tuple[float, float]]:
+    return [(at, m["corrections"]["z_um"]["offset_um"]) for at, m in heard if "corrections" in m]
+
+
+def ran(own: Service, work: Callable[[], Awaitable[None]]) -> None:
+    asyncio.run(running(own, work))
+
+
+@pytest.mark.parametrize("spoiled", ["kept", "missing", "cut", "another model"])
+def test_a_restart_is_no_step(broker: Mosquitto, tmp_path: Path, spoiled: str) -> None:
+    state, heard = tmp_path / "state.json", list[tuple[float, dict[str, Any]]]()
+    first, source = service(MqttSink(topic=TOPIC, port=broker.port), state, first_start="zero")
+    ran(first, lambda: heat(first, source, 3.0, 4.0))
+    left = first.state.corrections["z_um"].offset
+    assert left < -4.0
+    if spoiled == "missing":
+        state.unlink()
+    elif spoiled == "cut":
+        state.write_text(state.read_text()[:200])
+    elif spoiled == "another model":
+        state.write_text(state.read_text().replace('"models": "', '"models": "0'))
+    again, source = service(MqttSink(topic=TOPIC, port=broker.port), state)
+
+    async def work() -> None:
+        listener = asyncio.create_task(listen(broker.port, heard))
+        await asyncio.sleep(0.3)
+        await heat(again, source, 0.0, 2.0)
+        listener.cancel()
+
+    ran(again, work)
+    sent = offsets(heard)
+    assert len(sent) > 3
+    assert sent[0][1] == pytest.approx(left, abs=1.0)
+    for (t, a), (later, b) in itertools.pairwise(sent):
+        assert abs(b - a) <= SLOW.rate * (later - t + 0.3) + 1e-9
+
+
+def test_nothing_is_sent_while_the_correction_in_force_is_unknown(broker: Mosquitto, tmp_path: Path) -> None:
+    state, heard = tmp_path / "state.json", list[tuple[float, dict[str, Any]]]()
+    state.write_text('{"format": "thermocomp-state", "version": 2, "sha256": "", "models": [{}]}')
+    own, source = service(MqttSink(topic=TOPIC, port=broker.port), state)
+
+    async def work() -> None:
+        listener = asyncio.create_task(listen(broker.port, heard))
+        await heat(own, source, 3.0, 1.5)
+        assert offsets(heard) == []
+        shown = snapshot(own, 1.0)
+        assert (shown["targets"][0]["state"], shown["state"]["word"]) == ("unknown", "unknown")
+        assert "order 'start'" in shown["alarms"][0]
+        for do in ("run", "hold", "shadow", "rezero"):
+            assert "unknown" in give(own, PageOrder(target="z_um", do=do))  # type: ignore[arg-type]
+        assert give(own, PageOrder(target="z_um", do="start")) == ""
+        assert "is known" in give(own, PageOrder(target="z_um", do="start"))
+        await heat(own, source, 3.0, 1.5)
+        sent = offsets(heard)
+        assert abs(sent[0][1]) <= SLOW.rate * 0.5
+        assert sent[-1][1] < -1.0
+        listener.cancel()
+
+    ran(own, work)
+
+
+def test_a_first_start_waits_for_an_order_also_after_a_restart(tmp_path: Path) -> None:
+    path, state = tmp_path / "out.json", tmp_path / "state.json"
+    for _ in range(2):
+        own, source = service(FileSink(path=path), state)
+        ran(own, partial(heat, own, source, 3.0, 1.5))
+        assert own.state.orders["z_um"].word == "first start"
+        assert not path.exists()
+        assert state.exists()
+    own, source = service(FileSink(path=path), state, first_start="zero")
+
+    async def work() -> None:
+        await heat(own, source, 3.0, 0.5)
+        assert give(own, PageOrder(target="z_um", do="start")) == ""
+        await heat(own, source, 3.0, 1.0)
+
+    ran(own, work)
+    assert path.exists()
+
+
+def test_a_controller_that_comes_later_says_what_is_in_force(tmp_path: Path) -> None:
+    controller = Controller()
+    controller.offset = None
+    own, source = service(controller, tmp_path / "state.json")
+
+    async def work() -> None:
+        await heat(own, source, 3.0, 1.0)
+        assert own.state.orders["z_um"].word == "first start"
+        controller.offset = -5.0
+        await until(lambda: "z_um" not in own.state.orders)
+        assert own.state.corrections["z_um"] == Correction(-5.0)
+
+    ran(own, work)
+
+
+def test_a_consumer_knows_state_reason_and_end(broker: Mosquitto, tmp_path: Path) -> None:
+    heard = list[tuple[float, dict[str, Any]]]()
+    sink = MqttSink(topic=TOPIC, port=broker.port)
+    own, source = service(sink, tmp_path / "state.json", first_start="zero")
+
+    async def work() -> None:
+        await heat(own, source, 3.0, 1.0)
+        listener = asyncio.create_task(listen(broker.port, heard))  # later: the messages are retained
+        await until(lambda: len({m["topic"] for _, m in heard}) == 2)
+        assert {m["topic"]: m.get("state") for _, m in heard} == {TOPIC: None, f"{TOPIC}/status": "running"}
+        give(own, PageOrder(target="z_um", do="hold"))
+        await heat(own, source, 3.0, 0.5)
+        await until(lambda: offsets(heard)[-1:] != [])
+        last = [m for _, m in heard if "corrections" in m][-1]
+        assert last["corrections"]["z_um"]["state"] == "holding"
+        assert last["corrections"]["z_um"]["reason"] == "by hand, on the page"
+        numbers = [m["sequence"] for _, m in heard if "corrections" in m]
+        assert numbers == sorted(set(numbers))
+        listener.cancel()
+        heard.clear()
+
+    ran(own, work)
+
+    async def after() -> None:
+        listener = asyncio.create_task(listen(broker.port, heard))
+        await until(lambda: any(m.get("state") == "stopped" for _, m in heard))
+        listener.cancel()
+
+    asyncio.run(after())
+
+
+def test_a_broken_connection_is_published_by_the_broker(broker: Mosquitto) -> None:
+    heard = list[tuple[float, dict[str, Any]]]()
+
+    async def work() -> None:
+        listener = asyncio.create_task(listen(broker.port, heard))
+        sink = MqttSink(topic=TOPIC, port=broker.port)
+        await sink.connect(5.0)
+        await until(lambda: any(m.get("state") == "running" for _, m in heard))
+        assert sink._client is not None
+        sink._client._client.socket().close()  # type: ignore[union-attr]  # as with a dead computer
+        await until(lambda: any(m.get("state") == "lost" for _, m in heard))
+        listener.cancel()
+        await sink.close()
+
+    asyncio.run(work())
+
+
+def test_active_only_while_the_controller_confirms(broker: Mosquitto, tmp_path: Path) -> None:
+    sink = ConfirmedMqttSink(topic=TOPIC, port=broker.port, confirm_topic="m/7/confirmed")
+    own, source = service(sink, tmp_path / "state.json", first_start="zero")
+
+    def word() -> str:
+        return str(snapshot(own, 1.0)["targets"][0]["state"])
+
+    async def confirm() -> None:
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            await client.subscribe(TOPIC)
+            async for message in client.messages:
+                assert isinstance(message.payload, bytes)
+                await client.publish("m/7/confirmed", message.payload)
+
+    async def work() -> None:
+        heating = asyncio.create_task(heat(own, source, 1.0, 60.0))
+        await until(lambda: word() == "not confirmed")
+        controller = asyncio.create_task(confirm())
+        await until(lambda: word() == "active")
+        controller.cancel()
+        await until(lambda: word() == "not confirmed", 15.0)
+        await asyncio.to_thread(broker.kill)
+        await until(lambda: "MqttSink" in " ".join(snapshot(own, 1.0)["alarms"]), 5.0)
+        heating.cancel()
+
+    ran(own, work)
+
+
+def test_sent_is_not_confirmed(broker: Mosquitto, tmp_path: Path) -> None:
+    own, source = service(MqttSink(topic=TOPIC, port=broker.port), tmp_path / "state.json", first_start="zero")
+
+    async def work() -> None:
+        await heat(own, source, 1.0, 2.0)
+        shown = snapshot(own, 1.0)
+        assert shown["targets"][0]["state"] == "sent, not confirmed"
+        assert (shown["state"]["word"], shown["alarms"]) == ("sent, not confirmed", [])
+        heating = asyncio.create_task(heat(own, source, 1.0, 30.0))
+        await asyncio.to_thread(broker.kill)
+        begin = time.monotonic()
+        await until(lambda: snapshot(own, 1.0)["state"]["word"] == "not confirmed", 6.0)
+        assert time.monotonic() - begin < 5.0
+        assert "MqttSink" in snapshot(own, 1.0)["alarms"][0]
+        heating.cancel()
+
+    ran(own, work)
