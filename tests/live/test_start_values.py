@@ -105,7 +105,7 @@ def test_nothing_is_sent_while_the_correction_in_force_is_unknown(broker: Mosqui
         assert (shown["targets"][0]["state"], shown["state"]["word"]) == ("unknown", "unknown")
         assert "order 'start'" in shown["alarms"][0]
         for do in ("run", "hold", "shadow", "rezero"):
-            assert "unknown" in give(own, PageOrder(target="z_um", do=do))  # type: ignore[arg-type]
+            assert "unknown" in give(own, PageOrder(target="z_um", do=do))
         assert give(own, PageOrder(target="z_um", do="start")) == ""
         assert "is known" in give(own, PageOrder(target="z_um", do="start"))
         await heat(own, source, 3.0, 1.5)
