@@ -221,7 +221,7 @@ def test_active_only_while_the_controller_confirms(broker: Mosquitto, tmp_path: 
         controller.cancel()
         await until(lambda: word() == "not confirmed", 15.0)
         await asyncio.to_thread(broker.kill)
-        await until(lambda: "MqttSink" in " ".join(snapshot(own, 1.0)["alarms"]), 5.0)
+        await until(lambda: "MQTT" in " ".join(snapshot(own, 1.0)["alarms"]), 5.0)
         heating.cancel()
 
     ran(own, work)
@@ -240,7 +240,7 @@ def test_sent_is_not_confirmed(broker: Mosquitto, tmp_path: Path) -> None:
         begin = time.monotonic()
         await until(lambda: snapshot(own, 1.0)["state"]["word"] == "not confirmed", 6.0)
         assert time.monotonic() - begin < 5.0
-        assert "MqttSink" in snapshot(own, 1.0)["alarms"][0]
+        assert "MQTT" in snapshot(own, 1.0)["alarms"][0]
         heating.cancel()
 
     ran(own, work)

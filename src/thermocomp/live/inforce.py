@@ -58,7 +58,7 @@ class ConfirmedCorrections:
                 return AtController("not confirmed", f"{one.name}: {link.reason or link.state}")
         controllers = [one for one in mine if confirms(one.sink)]
         if not controllers:
-            return AtController("sent, not confirmed", f"{mine[0].name} does not confirm what is in force")
+            return AtController("sent, not confirmed", f"{mine[0].name} does not confirm what the controller has")
         found, at = self.confirmed.get(target, (None, -math.inf))
         age = (self._clock.tick() - at) / self._clock.speed
         if found is None or age > CONFIRM_WITHIN:

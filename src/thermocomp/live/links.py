@@ -78,7 +78,12 @@ class Link:
     def name(self) -> str:
         """Kind of source or sink, with its topic or path."""
         where = getattr(self.end, "topic", None) or getattr(self.end, "path", None)
-        return type(self.end).__name__ + (f" {where}" if where else "")
+        return self.kind + (f" {where}" if where else "")
+
+    @property
+    def kind(self) -> str:
+        """Kind of source or sink: the attribute ``label`` of its class, or the name of the class."""
+        return str(getattr(self.end, "label", type(self.end).__name__))
 
     def news(self) -> Iterator[str]:
         """Yield the events since the last call: connection lost, connected again, messages refused."""

@@ -6,6 +6,7 @@ import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import aiomqtt
 
@@ -23,6 +24,7 @@ from thermocomp.live.adapters.messages import read_corrections, read_message, wr
 class Broker:
     """Address of a broker, and a topic on it."""
 
+    label: ClassVar[str] = "MQTT"
     topic: str
     host: str = "127.0.0.1"
     port: int = 1883

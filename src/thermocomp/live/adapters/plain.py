@@ -93,6 +93,7 @@ class Played:
 class ReplaySource(Played):
     """Source that plays back a recording in thermocomp's own CSV format."""
 
+    label: ClassVar[str] = "recording"
     path: Path
 
     def _open(self) -> Iterator[tuple[float, dict[str, float]]]:
@@ -109,6 +110,7 @@ class SimulatedSource(Played):
         Experiment to run; all its tests in sequence.
     """
 
+    label: ClassVar[str] = "virtual machine"
     experiment: Experiment
     seed: int = 0
     #: noise-free displacements of the row played last, as an ideal probe would measure them [um]
@@ -135,6 +137,7 @@ class SimulatedSource(Played):
 class FileSink:
     """Sink that writes the corrections in force to a file, replaced atomically each time."""
 
+    label: ClassVar[str] = "file"
     only_sent: ClassVar[bool] = True
     path: Path
     _connection: Connection = field(default_factory=Connection, init=False, repr=False)

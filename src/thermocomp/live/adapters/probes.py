@@ -5,6 +5,7 @@ import random
 import time
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import aiomqtt
 
@@ -53,6 +54,7 @@ class SimulatedProbe:
         Standard deviation [um].
     """
 
+    label: ClassVar[str] = "probe of the virtual machine"
     machine: SimulatedSource
     targets: tuple[str, ...]
     every: float

@@ -156,7 +156,7 @@ def _link(one: Link) -> dict[str, Any]:
     status = one.status()
     return {
         "kind": kind,
-        "name": type(one.end).__name__,
+        "name": one.kind,
         "state": status.state,
         "reason": status.reason,
         "replaced": getattr(one.end, "replaced", 0),

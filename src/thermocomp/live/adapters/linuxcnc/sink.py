@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import SettingError, ThermocompError
@@ -53,6 +53,7 @@ class LinuxCncSink:
         No axes, or two targets for the same axis.
     """
 
+    label: ClassVar[str] = "LinuxCNC"
     path: Path
     axes: dict[str, str]
     magnitude: float | None = None

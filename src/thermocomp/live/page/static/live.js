@@ -12,6 +12,17 @@ function axis(label) {
   return { stroke: css("--soft"), grid: { stroke: css("--line"), width: 1 }, label, labelSize: 20, size: 56 };
 }
 
+function times(_plot, splits) {  // 24 h, and the ISO date where it begins
+  const two = n => String(n).padStart(2, "0"), fine = splits.length > 1 && splits[1] - splits[0] < 60;
+  let day = "";
+  return splits.map(s => {
+    const d = new Date(1e3 * s), own = `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`;
+    const text = `${two(d.getHours())}:${two(d.getMinutes())}` + (fine ? `:${two(d.getSeconds())}` : "") + (own === day ? "" : "\n" + own);
+    day = own;
+    return text;
+  });
+}
+
 function draw(id, node, series, data, bands, label, points) {
   if (!node || data[0].length < 1) return;
   const shape = JSON.stringify(series.map(s => s.label));
@@ -20,7 +31,7 @@ function draw(id, node, series, data, bands, label, points) {
   if (chart) { chart.plot.setData(data); return; }
   const options = {
     width: Math.max(260, node.clientWidth), height: points ? 200 : 230, series: [{}, ...series], bands,
-    axes: [{ stroke: css("--soft"), grid: { stroke: css("--line"), width: 1 } }, axis(label)],
+    axes: [{ stroke: css("--soft"), grid: { stroke: css("--line"), width: 1 }, values: times, space: 70 }, axis(label)],
     cursor: { drag: { x: false, y: false } }, legend: { live: false, show: label !== "um" },
   };
   charts.set(id, { plot: new uPlot(options, data, node), shape, node });
