@@ -3,6 +3,8 @@
 import asyncio
 import itertools
 import json
+import subprocess
+import sys
 import time
 from collections.abc import Awaitable, Callable
 from functools import partial
@@ -182,21 +184,39 @@ def test_a_consumer_knows_state_reason_and_end(broker: Mosquitto, tmp_path: Path
     asyncio.run(after())
 
 
-def test_a_broken_connection_is_published_by_the_broker(broker: Mosquitto) -> None:
+CHILD = """
+import asyncio, sys
+from thermocomp.live.adapters.mqtt import MqttSink
+async def run():
+    await MqttSink(topic=sys.argv[1], port=int(sys.argv[2])).connect(5.0)
+    print("connected", flush=True)
+    await asyncio.sleep(60.0)
+asyncio.run(run())
+"""
+
+
+def test_a_killed_compensator_is_published_by_the_broker_as_lost(broker: Mosquitto) -> None:
     heard = list[tuple[float, dict[str, Any]]]()
+    child = subprocess.Popen([sys.executable, "-c", CHILD, TOPIC, str(broker.port)], stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    assert child.stdout.readline() == "connected\n"
 
     async def work() -> None:
         listener = asyncio.create_task(listen(broker.port, heard))
-        sink = MqttSink(topic=TOPIC, port=broker.port)
-        await sink.connect(5.0)
-        await until(lambda: any(m.get("state") == "running" for _, m in heard))
-        assert sink._client is not None
-        sink._client._client.socket().close()  # type: ignore[union-attr]  # as with a dead computer
-        await until(lambda: any(m.get("state") == "lost" for _, m in heard))
+        await until(lambda: [m["state"] for _, m in heard] == ["running"])
+        child.kill()
+        await until(lambda: [m["state"] for _, m in heard] == ["running", "lost"])
         listener.cancel()
-        await sink.close()
+        heard.clear()
+        later = asyncio.create_task(listen(broker.port, heard))
+        await until(lambda: [m["state"] for _, m in heard] == ["lost"])
+        later.cancel()
 
-    asyncio.run(work())
+    try:
+        asyncio.run(work())
+    finally:
+        child.kill()
+        child.communicate()
 
 
 def test_active_only_while_the_controller_confirms(broker: Mosquitto, tmp_path: Path) -> None:

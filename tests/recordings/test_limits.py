@@ -37,7 +37,9 @@ def test_a_text_over_a_limit_says_which_and_how_to_raise_it(tmp_path: Path, limi
     path = tmp_path / "rec.csv"
     path.write_text(TEXT)
 
-    with pytest.raises(RecordingError, match=rf"rec\.csv: {place}over {most:,} .*mapping, \[limits\] {limit} = \d+$"):
+    with pytest.raises(
+        RecordingError, match=rf"rec\.csv: {place}over {most:,} .*mapping file: \[limits\] {limit} = \d+$"
+    ):
         read(path, Mapping(limits=FileLimits(**{limit: most})))
 
     toml = tmp_path / "m.toml"
