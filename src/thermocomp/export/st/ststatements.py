@@ -64,7 +64,6 @@ class _Writer(Printer):
 
     operators: ClassVar[Mapping[Operator, str]] = {
         "//": "/",
-        "%": "MOD",
         "and": "AND",
         "or": "OR",
         "==": "=",

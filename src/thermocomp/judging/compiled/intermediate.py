@@ -11,7 +11,7 @@ from thermocomp.runtime.program.tree import Expression, Function, Kind, Statemen
 
 _TYPES: dict[Kind, str] = {"real": "double", "time": "double", "int": "i64", "bool": "i1"}
 _FLOATS = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
-_INTEGERS = {"+": "add", "-": "sub", "*": "mul", "//": "sdiv", "%": "srem"}
+_INTEGERS = {"+": "add", "-": "sub", "*": "mul", "//": "sdiv"}
 _COMPARED = {
     "==": ("oeq", "eq"),
     "!=": ("une", "ne"),

@@ -6,7 +6,7 @@ from typing import Literal, assert_never
 
 #: ``time`` is always in double precision [s]
 Kind = Literal["real", "time", "int", "bool"]
-Operator = Literal["+", "-", "*", "/", "//", "%", "==", "!=", "<", "<=", ">", ">=", "and", "or"]
+Operator = Literal["+", "-", "*", "/", "//", "==", "!=", "<", "<=", ">", ">=", "and", "or"]
 
 
 @dataclass(frozen=True)

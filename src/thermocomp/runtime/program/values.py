@@ -108,9 +108,6 @@ class Whole(Ordered[int]):
     def __floordiv__(self, other: "Whole | int") -> "Whole":
         return self._with("//", other)
 
-    def __mod__(self, other: "Whole | int") -> "Whole":
-        return self._with("%", other)
-
     @property
     def real(self) -> "Number":
         """The integer converted to a real number."""
