@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,11 @@ from typing import Any
 import aiomqtt
 import pytest
 from broker import Mosquitto
-from test_loop import Controller, Given, machine, running, say, until
+from test_loop import Broken, Controller, Given, machine, running, say, until
 
 from thermocomp.core.correction import Correction, Limits
+from thermocomp.core.exceptions import ThermocompError
+from thermocomp.core.ports import LinkStatus
 from thermocomp.live.adapters.mqtt import ConfirmedMqttSink, MqttSink
 from thermocomp.live.adapters.plain import FileSink
 from thermocomp.live.loop import Service
@@ -151,6 +153,43 @@ def test_a_controller_that_comes_later_says_what_is_in_force(tmp_path: Path) -> 
         assert own.state.corrections["z_um"] == Correction(-5.0)
 
     ran(own, work)
+
+
+class Late(Broken):
+    """A sink out of reach at the start, which then knows what it was sent last, and confirms nothing."""
+
+    def __init__(self) -> None:
+        super().__init__(hangs=False)
+        self.there, self.sent = False, list[float]()
+
+    async def connect(self, timeout: float) -> None:
+        if not self.there:
+            raise ThermocompError("out of reach")
+
+    async def apply(self, corrections: Mapping[str, Correction]) -> None:
+        self.sent.append(corrections["z_um"].offset)
+
+    async def last_sent(self) -> dict[str, Correction]:
+        return {"z_um": Correction(-6.0)}
+
+    def status(self) -> LinkStatus:
+        return LinkStatus("connected" if self.there else "failed", "out of reach")
+
+
+def test_a_sink_that_is_out_of_reach_at_the_start_knows_later(tmp_path: Path) -> None:
+    late = Late()
+    own, source = service(late, tmp_path / "state.json")
+
+    async def work() -> None:
+        heating = asyncio.create_task(heat(own, source, 0.0, 30.0))
+        await until(lambda: "z_um" in own.state.orders)
+        late.there = True
+        await until(lambda: "z_um" not in own.state.orders, 20.0)
+        await until(lambda: len(late.sent) > 2)
+        heating.cancel()
+
+    ran(own, work)
+    assert late.sent[0] == pytest.approx(-6.0, abs=SLOW.rate * 0.5)
 
 
 def test_a_consumer_knows_state_reason_and_end(broker: Mosquitto, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.ports import Probe, Sink, Source, Suspending, TargetStatus
+from thermocomp.core.ports import Probe, Remembering, Sink, Source, Suspending, TargetStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
@@ -219,6 +219,17 @@ class Service:
             self.state = wait_for_start(self.state, target, WAITS[first])
             self.say("state", f"{target} {WAITS[first].word}: {WAITS[first].reason}")
 
+    async def _learn_start(self) -> None:
+        """Start targets that wait, once a sink that was out of reach at the start knows what it was sent last."""
+        waiting = {t for t, o in self.state.orders.items() if o.word in UNKNOWN}
+        for outlet in self.outlets if waiting else ():
+            if isinstance(outlet.sink, Remembering) and outlet.status().state == "connected":
+                found = self.start_values.within_limits(await outlet.sink.last_sent() or {})
+                for target in waiting & found.keys():
+                    self.state = start_from(self.compensator, self.state, target, found[target])
+                    self.state = self.state._replace(away=math.nan)
+                    self.say("state", f"{target} starts from {found[target].offset:+.1f} um, as last sent")
+
     def _put(self, corrections: Mapping[str, Correction], statuses: Mapping[str, TargetStatus] | None = None) -> None:
         """Hand corrections to all sinks, but none for a target whose correction in force is unknown."""
         orders = self.state.orders
@@ -237,6 +248,7 @@ class Service:
                     self.say("link", text)
             if self._ending:
                 continue
+            await self._learn_start()
             if silent > max(2.0, 2.0 * self.clock.speed):
                 why = f"no reading for {silent:.0f} s" + (f": {self.untimely}" if self.untimely else "")
                 self.state, said = self.compensator.wait(self.state, tick, why)
