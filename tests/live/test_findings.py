@@ -54,6 +54,7 @@ def lay(folder: Path, text: str = GOOD) -> Path:
     modelfile.write([model], folder / "model.json", overwrite=True)
     (folder / "day.csv").write_text("time_s,t1_C\n0,20.0\n1,21.0\n", encoding="ascii")
     (folder / "token.txt").write_text("0123456789abcdef", encoding="ascii")
+    (folder / "token.txt").chmod(0o600)
     path = folder / "serve.toml"
     path.write_text(text, encoding="utf-8")
     return path
@@ -196,8 +197,9 @@ def faults(path: Path) -> list[str]:
 def test_what_is_there_and_what_is_not(old: str, new: str, says: str, tmp_path: Path) -> None:
     path = lay(tmp_path, GOOD.replace(old, new))
     os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "short.txt").write_text("short", encoding="ascii")
-    (tmp_path / "two.txt").write_text("0123456789abcdef\nfedcba9876543210\n", encoding="ascii")
+    for name, text in (("short.txt", "short"), ("two.txt", "0123456789abcdef\nfedcba9876543210\n")):
+        (tmp_path / name).write_text(text, encoding="ascii")
+        (tmp_path / name).chmod(0o600)
     (tmp_path / "broken.csv").write_bytes(b"time_s,t1_C\n0,20\n1,\xff\n")
     found = faults(path)
     assert any(says in line for line in found), found

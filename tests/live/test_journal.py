@@ -85,6 +85,7 @@ def test_rows_come_back_as_they_were(tmp_path: Path) -> None:
     status = journal.status()
     assert (status.confirmed, status.waiting, status.lost, status.refused, status.reason) == (len(ROWS), 0, 0, 0, "")
     assert read(tmp_path) == [START, *ROWS]  # while it is open
+    assert {p.stat().st_mode & 0o777 for p in tmp_path.glob("live.*.db*")} == {0o600}  # the owner alone
     journal.close()
     journal.close()
     assert read(tmp_path) == [START, *ROWS]

@@ -194,10 +194,22 @@ def test_an_implausible_one_is_refused_and_asks_for_action() -> None:
 def test_a_token_that_is_none_is_refused(content: str, tmp_path: Path) -> None:
     path = tmp_path / "token"
     path.write_text(content, encoding="utf-8")
+    path.chmod(0o600)
     with pytest.raises(InputError, match="token"):
         web.read_token(path)
     with pytest.raises(InputError, match="cannot be read"):
         web.read_token(tmp_path / "none")
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o644, 0o660])
+def test_a_token_that_others_can_read_is_refused(mode: int, tmp_path: Path) -> None:
+    path = tmp_path / "token"
+    path.write_text(TOKEN, encoding="ascii")
+    path.chmod(mode)
+    with pytest.raises(InputError, match="chmod 600"):
+        web.read_token(path)
+    path.chmod(0o600)
+    assert web.read_token(path) == TOKEN
 
 
 def test_a_port_that_is_taken_is_told() -> None:

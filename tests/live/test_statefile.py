@@ -308,3 +308,11 @@ def test_what_is_damaged_by_a_byte_is_refused_by_name(
         assert "state.json" in error if found is None else same(found, state)  # a blank, or a digit beyond the last bit
         unharmed += found is not None
     assert unharmed < 0.02 * count
+
+
+def test_only_the_owner_may_read_it(machine: Compensator, tmp_path: Path) -> None:
+    path = tmp_path / "state.json"
+    path.write_text("older")
+    path.chmod(0o644)
+    statefile.write(machine.start(), machine, path, datetime.now(UTC))
+    assert path.stat().st_mode & 0o777 == 0o600

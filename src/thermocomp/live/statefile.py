@@ -130,8 +130,9 @@ def _mean(entry: Any, place: str) -> Any:
 
 
 def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
-    """Replace the state file; after a kill either the old or the new state is complete."""
+    """Replace the state file; after a kill either the old or the new state is complete. Only its owner may read it."""
     jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
+    Path(path).chmod(0o600)
 
 
 def read(path: str | Path, compensator: Compensator) -> Saved:

@@ -189,6 +189,8 @@ class Journal:
 
     def _attach(self, path: Path) -> sqlite3.Connection | None:
         """Return the connection to a file to be continued; None if it is of a newer version, or was set aside."""
+        if not path.exists():  # only its owner may read it; SQLite gives its other files the same permissions
+            os.close(os.open(path, os.O_CREAT | os.O_RDWR, 0o600))
         connection = sqlite3.connect(path, timeout=0.2, isolation_level=None, check_same_thread=False)
         try:
             version = find_version(connection)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import socket
 import time
 from collections.abc import Generator
@@ -43,8 +44,10 @@ class _Server(uvicorn.Server):
 
 
 def read_token(path: Path) -> str:
-    """Return the token in a file, or raise an error if it is missing, too short, or cannot be sent."""
+    """Return the token in a file, or raise an error if it is missing, open to others, too short or cannot be sent."""
     try:
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            raise InputError(f"{path}: other users of this computer can read the token: run 'chmod 600 {path}'")
         token = path.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(f"{path}: the page's token cannot be read: {e}") from e
