@@ -146,7 +146,7 @@ def test_each_hostile_message_is_refused_with_a_reason(shop: Floor) -> None:
     shop.until(lambda: sum("messages refused" in e.text for e in shop.service.events) >= 2)
     texts = [e["text"] for e in shop.state()["events"] if "messages refused" in e["text"]]
     assert any("m/7: a message" in t for t in texts)
-    assert any("MqttProbe p: " in t for t in texts)
+    assert any("MQTT p: " in t for t in texts)
     assert all(t.isprintable() for t in texts)
 
 
