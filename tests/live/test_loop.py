@@ -271,14 +271,6 @@ def test_an_old_reading_is_not_used() -> None:
     assert service.said is None
 
 
-@pytest.fixture
-def broker(tmp_path: Path) -> object:
-    found = Mosquitto(tmp_path)
-    found.start()
-    yield found
-    found.kill()
-
-
 def test_a_real_broker_that_is_killed_and_comes_back(broker: Mosquitto) -> None:
     source = MqttSource(topic="m/7", port=broker.port, names={"temperature": "t"})
     sink = MqttSink(topic="m/7/corrections", port=broker.port)

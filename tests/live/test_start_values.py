@@ -29,14 +29,6 @@ SLOW = Limits(rate=2.0)  # um/s
 TOPIC = "m/7/corrections"
 
 
-@pytest.fixture
-def broker(tmp_path: Path) -> Any:
-    found = Mosquitto(tmp_path)
-    found.start()
-    yield found
-    found.kill()
-
-
 def service(sink: Any, state: Path | None, **options: Any) -> tuple[Service, Given]:
     source = Given()
     return Service(machine(SLOW), [source], [sink], state_path=state, **options), source

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.bands import Bands
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
@@ -67,7 +68,8 @@ class Stack:
             spreads.append(m.spread_expressions(leaves))
             self._taps.append(np.array(mine, dtype=np.intp))
         self._layers = Layers([*outputs, *(node for nodes in spreads for node in nodes)], len(taps))
-        self._bands = _Bands(self.models, self._taps, [len(nodes) for nodes in spreads])
+        self._bands = Bands(self.models, self._taps, [len(nodes) for nodes in spreads])
+        self._moved = [k for k, m in enumerate(models) if m.support.policy != "clip"]  # by their support
         self._tap_names = tuple(i.name for i, _, _ in taps)
         self._columns = np.array([self.inputs.index(name) for name in self._tap_names], dtype=np.intp)
         self._zero, self._low, self._high, self._span = np.array(bounds, dtype=np.float64).reshape(-1, 4).T
@@ -167,46 +169,17 @@ class Stack:
         """
         if state.memory is None or all(m.band is None for m in self.models):
             return np.full((*values.shape[:-1], len(self.models)), np.nan)
-        return self._bands.half_widths(self._changes(state.reference, values)[1], state)
+        said, n = state.outputs, len(self.models)
+        found = self._bands.half_widths(self._changes(state.reference, values)[1], said[..., n:])
+        if self._moved:
+            found[..., self._moved] += np.abs(said[..., self._moved] - state.deviation[..., self._moved])
+        return found
 
     def outside(self, state: StackState) -> tuple[str, ...]:
         """Return the names of the inputs that were outside the trained range of a model in the last step."""
         beyond = np.moveaxis(state.outside, -1, 0)
         found = {name for name, out in zip(self._tap_names, beyond, strict=True) if out.any()}
         return tuple(name for name in self.inputs if name in found)
-
-
-class _Bands:
-    """Bands of all models, evaluated together: see `Band.half_width`."""
-
-    def __init__(self, models: Sequence[ErrorModel], taps: Sequence[IndexArray], spreads: Sequence[int]) -> None:
-        bands = [m.band for m in models]
-        self._sums = np.repeat(np.eye(len(models)), spreads, axis=0)  # (n_spread of all, n_models)
-        self._floor = np.array([np.nan if b is None else b.floor for b in bands]) ** 2
-        self._running, self._stopped = (
-            np.array(
-                [np.nan if b is None else getattr(b, name) if b.speeds else max(b.running, b.stopped) for b in bands]
-            )
-            for name in ("running", "stopped")
-        )
-        # models mostly have the same speeds: each set of taps and threshold is compared once
-        speeds = [
-            (tuple(own[list(m.band.speeds)].tolist()) if m.band else (), m.thresholds.stopped_speed)
-            for m, own in zip(models, taps, strict=True)
-        ]
-        self._turns = [(np.array(own, dtype=np.intp), most) for own, most in dict.fromkeys(speeds)]
-        self._of = [list(dict.fromkeys(speeds)).index(own) for own in speeds]
-        self._kept = np.array([k for k, m in enumerate(models) if m.band and m.support.policy != "clip"], dtype=np.intp)
-
-    def half_widths(self, clipped: FloatArray, state: StackState) -> FloatArray:
-        """Return the half-widths, (..., n_models), for the clipped values of all taps, (..., n_taps)."""
-        n, said = len(self._floor), state.outputs
-        turns = np.stack([(np.abs(clipped[..., own]) > most).any(axis=-1) for own, most in self._turns], axis=-1)
-        factor = np.where(turns[..., self._of], self._running, self._stopped)
-        found = np.asarray(factor * np.sqrt(self._floor + said[..., n:] ** 2 @ self._sums))
-        if self._kept.size:
-            found[..., self._kept] += np.abs(said[..., self._kept] - state.deviation[..., self._kept])
-        return found
 
 
 def _padded(taps: dict[int, IndexArray]) -> tuple[IndexArray, IndexArray]:

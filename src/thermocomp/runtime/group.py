@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
+from thermocomp.core.bands import Bands
 from thermocomp.core.bounds import GAP
 from thermocomp.core.layers import Layers
 from thermocomp.core.model import ErrorModel
@@ -96,11 +97,8 @@ class _Joint:
         spreads = [m.spread_expressions(leaves) for m in models]
         nodes = [*(m.expression(leaves) for m in models), *(node for nodes in spreads for node in nodes)]
         self._layers, self._n = Layers(nodes, len(leaves), models[0].remembered), len(models)
-        self._sum = np.repeat(np.eye(len(models)), [len(s) for s in spreads], axis=0)  # (n_spread of all, n_models)
-        bands = [m.band for m in models]
-        self._floor = np.array([np.nan if b is None else b.floor for b in bands]) ** 2
-        self._running = np.array([np.nan if b is None else b.running for b in bands])
-        self._stopped = np.array([np.nan if b is None else b.stopped for b in bands])
+        own = np.arange(len(leaves))
+        self._bands = Bands(models, [own] * len(models), [len(s) for s in spreads])
 
     def step(self, state: State, values: FloatArray, dt: float) -> tuple[list[State], list[float], list[float]]:
         """Process a reading with all models of the group: see `Group.step`."""
@@ -109,13 +107,7 @@ class _Joint:
         change, outside = lead.clip(values - reference)
         memory = self._layers.begin(change) if state.memory is None else state.memory
         memory, said = self._layers.advance(memory, change, 0.0 if begins else dt)
-        deviations, widths = said[: self._n], np.full(self._n, np.nan)
-        if lead.band is not None:
-            spread = said[self._n :] ** 2 @ self._sum
-            factor: FloatArray = np.maximum(self._running, self._stopped)
-            if lead.band.speeds:
-                factor = self._running if lead.band.turning(change, lead.thresholds.stopped_speed) else self._stopped
-            widths = factor * np.sqrt(self._floor + spread)
+        deviations, widths = said[: self._n], self._bands.half_widths(change, said[self._n :])
         found = [State(reference, memory, d, outside) for d in deviations]
         return found, deviations.tolist(), widths.tolist()
 

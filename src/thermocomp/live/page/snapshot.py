@@ -66,12 +66,12 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
 def find_alarms(service: Service) -> Iterator[str]:
     """Yield what needs attention: lost links, corrections that differ, sensors, time stamps, files not written."""
     said = service.said
-    for name, line in service.compensator.lines.items():
+    for name in service.compensator.lines:
         there = service.in_force.at_controller(name, service.outlets)
         order = service.state.orders.get(name)
         if order is not None and order.word in UNKNOWN:
             yield f"{name}: {order.word}: {order.reason}"
-        elif there.word == "not confirmed" and name not in service.compensator.shadow and line is not None:
+        elif there.word == "not confirmed" and name not in service.compensator.shadow:
             yield f"{name}: not confirmed: {there.reason}"
     for one in service.links():
         if (link := one.status()).state == "failed" or (link.state == "closed" and link.reason and not one.ended):

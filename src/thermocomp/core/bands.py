@@ -1,0 +1,56 @@
+"""Uncertainty bands of several models, evaluated together."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermocomp.core.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from thermocomp.core.model import ErrorModel
+
+
+class Bands:
+    """Bands of models, as `Band.half_width` of each.
+
+    Parameters
+    ----------
+    models : sequence of ErrorModel
+    taps : sequence of ndarray of int of shape (n_inputs,)
+        Positions of the inputs of each model among the changes.
+    spreads : sequence of int
+        Number of spreads of each model.
+    """
+
+    def __init__(self, models: "Sequence[ErrorModel]", taps: Sequence[IntArray], spreads: Sequence[int]) -> None:
+        bands = [m.band for m in models]
+        self._sums = np.repeat(np.eye(len(models)), spreads, axis=0)  # (n_spread of all, n_models)
+        self._floor = np.array([np.nan if b is None else b.floor for b in bands]) ** 2
+        self._running, self._stopped = (
+            np.array(
+                [np.nan if b is None else getattr(b, name) if b.speeds else max(b.running, b.stopped) for b in bands]
+            )
+            for name in ("running", "stopped")
+        )
+        # models mostly have the same speeds: each set of positions and threshold is compared once
+        speeds = [
+            (tuple(own[list(m.band.speeds)].tolist()) if m.band else (), m.thresholds.stopped_speed)
+            for m, own in zip(models, taps, strict=True)
+        ]
+        self._turns = [(np.array(own, dtype=np.intp), most) for own, most in dict.fromkeys(speeds)]
+        self._of = [list(dict.fromkeys(speeds)).index(own) for own in speeds]
+
+    def half_widths(self, change: FloatArray, spreads: FloatArray) -> FloatArray:
+        """Return the half-widths, (..., n_models); nan for a model without a band.
+
+        Parameters
+        ----------
+        change : ndarray of shape (..., n_positions)
+            Inputs minus their reference [their units].
+        spreads : ndarray of shape (..., n_spreads)
+            Spreads of all models, in their order [their units].
+        """
+        turns = np.stack([(np.abs(change[..., own]) > most).any(axis=-1) for own, most in self._turns], axis=-1)
+        factor = np.where(turns[..., self._of], self._running, self._stopped)
+        return np.asarray(factor * np.sqrt(self._floor + spreads**2 @ self._sums))
