@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -98,6 +99,7 @@ def test_nothing_is_sent_while_the_correction_in_force_is_unknown(broker: Mosqui
         await heat(own, source, 3.0, 1.5)
         assert offsets(heard) == []
         shown = snapshot(own, 1.0)
+        assert shown["targets"][0]["at_controller"]["state"] == "not sent"
         assert (shown["targets"][0]["state"], shown["state"]["word"]) == ("unknown", "unknown")
         assert "order 'start'" in shown["alarms"][0]
         for do in ("run", "hold", "shadow", "rezero"):
@@ -135,10 +137,10 @@ def test_a_first_start_waits_for_an_order_also_after_a_restart(tmp_path: Path) -
 def test_a_controller_that_comes_later_says_what_is_in_force(tmp_path: Path) -> None:
     controller = Controller()
     controller.offset = None
-    own, source = service(controller, tmp_path / "state.json")
+    own, _ = service(controller, tmp_path / "state.json")
 
     async def work() -> None:
-        await heat(own, source, 3.0, 1.0)
+        await until(lambda: "z_um" in own.state.orders)
         assert own.state.orders["z_um"].word == "first start"
         controller.offset = -5.0
         await until(lambda: "z_um" not in own.state.orders)
@@ -168,9 +170,10 @@ class Late(Broken):
         return LinkStatus("connected" if self.there else "failed", "out of reach")
 
 
-def test_a_sink_that_is_out_of_reach_at_the_start_knows_later(tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", ["order", "zero"])
+def test_a_sink_that_is_out_of_reach_at_the_start_knows_later(tmp_path: Path, first: str) -> None:
     late = Late()
-    own, source = service(late, tmp_path / "state.json")
+    own, source = service(late, tmp_path / "state.json", first_start=first)
 
     async def work() -> None:
         heating = asyncio.create_task(heat(own, source, 0.0, 30.0))
@@ -292,6 +295,80 @@ def test_sent_is_not_confirmed(broker: Mosquitto, tmp_path: Path) -> None:
         await until(lambda: snapshot(own, 1.0)["state"]["word"] == "not confirmed", 6.0)
         assert time.monotonic() - begin < 5.0
         assert "MQTT" in snapshot(own, 1.0)["alarms"][0]
+        heating.cancel()
+
+    ran(own, work)
+
+
+async def report(port: int, offset: float) -> None:
+    """Report a correction in force, ten times a second, as a controller."""
+    own = {"offset_um": offset, "slope_um_per_m": 0.0, "reference_position_mm": 0.0}
+    async with aiomqtt.Client("127.0.0.1", port) as client:
+        while True:
+            await client.publish("m/7/confirmed", json.dumps({"corrections": {"z_um": own}}))
+            await asyncio.sleep(0.1)
+
+
+def test_what_the_controller_confirms_goes_before_what_was_sent(broker: Mosquitto, tmp_path: Path) -> None:
+    heard = list[tuple[float, dict[str, Any]]]()
+    sink = ConfirmedMqttSink(topic=TOPIC, port=broker.port, confirm_topic="m/7/confirmed")
+    own, source = service(sink, tmp_path / "state.json")
+
+    async def before() -> None:
+        own = {"offset_um": -2.0, "slope_um_per_m": 0.0, "reference_position_mm": 0.0}
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+            await client.publish(TOPIC, json.dumps({"corrections": {"z_um": own}}), retain=True)
+
+    async def work() -> None:
+        reporting = asyncio.create_task(report(broker.port, -9.0))
+        listener = asyncio.create_task(listen(broker.port, heard))
+        await heat(own, source, 0.0, 3.0)
+        listener.cancel()
+        reporting.cancel()
+
+    asyncio.run(before())
+    ran(own, work)
+    sent = [offset for _, offset in offsets(heard) if offset != -2.0]
+    assert sent[0] == pytest.approx(-9.0, abs=SLOW.rate * 0.5)
+
+
+def test_a_confirmation_of_something_else_is_none(broker: Mosquitto, tmp_path: Path) -> None:
+    sink = ConfirmedMqttSink(topic=TOPIC, port=broker.port, confirm_topic="m/7/confirmed")
+    own, source = service(sink, tmp_path / "state.json", first_start="zero")
+
+    def word() -> str:
+        return str(snapshot(own, 1.0)["targets"][0]["state"])
+
+    async def work() -> None:
+        reporting = asyncio.create_task(report(broker.port, 0.0))
+        heating = asyncio.create_task(heat(own, source, 0.1, 60.0))
+        await until(lambda: word() == "active")
+        await asyncio.sleep(1.5)  # noticed by the periodic work, too
+        reporting.cancel()
+        for wrong in (500.0, 5.0, -3.0):
+            reporting = asyncio.create_task(report(broker.port, wrong))
+            await until(lambda wrong=wrong: f"{wrong:+.1f} um in force" in " ".join(snapshot(own, 1.0)["alarms"]))
+            assert word() == "not confirmed"
+            reporting.cancel()
+        await until(lambda: any("not confirmed" in e.text for e in own.events))
+        heating.cancel()
+
+    ran(own, work)
+
+
+def test_a_broker_that_hangs_is_found(broker: Mosquitto, tmp_path: Path) -> None:
+    own, source = service(MqttSink(topic=TOPIC, port=broker.port), tmp_path / "state.json", first_start="zero")
+
+    async def work() -> None:
+        heating = asyncio.create_task(heat(own, source, 1.0, 60.0))
+        await until(lambda: snapshot(own, 1.0)["state"]["word"] == "sent, not confirmed")
+        assert broker.process is not None
+        broker.process.send_signal(signal.SIGSTOP)
+        try:
+            await until(lambda: snapshot(own, 1.0)["state"]["word"] == "not confirmed", 5.0)
+        finally:
+            broker.process.send_signal(signal.SIGCONT)
+        await until(lambda: snapshot(own, 1.0)["state"]["word"] == "sent, not confirmed", 20.0)
         heating.cancel()
 
     ran(own, work)

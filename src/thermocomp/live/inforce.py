@@ -1,6 +1,7 @@
 """Corrections in force at the controller, as confirmed by the sinks."""
 
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -10,6 +11,9 @@ from thermocomp.live.clock import ServiceClock
 from thermocomp.live.links import Outlet
 from thermocomp.live.recorder import CONFIRM_WITHIN
 from thermocomp.runtime.state import CompensatorState, Status
+
+#: difference from the corrections sent lately above which another one is in force [um]
+ASIDE = 1.0
 
 
 class AtController(NamedTuple):
@@ -29,6 +33,7 @@ class ConfirmedCorrections:
         controllers: list[Sink] = [s for s in sinks if confirms(s)]
         self._sure, self._clock = controllers or list(sinks), clock
         self._alarms = dict[str, str]()
+        self._demanded = deque[tuple[float, Mapping[str, Correction]]](maxlen=1000)
         #: correction and time of its confirmation, by target [um, s]
         self.confirmed = dict[str, tuple[Correction, float]]()
 
@@ -39,6 +44,21 @@ class ConfirmedCorrections:
     def confirm(self, found: Mapping[str, Correction]) -> None:
         """Store corrections in force as confirmed by a controller."""
         self.confirmed |= {t: (c, self._clock.tick()) for t, c in found.items()}
+
+    def demand(self, corrections: Mapping[str, Correction]) -> None:
+        """Store corrections that are being sent: what a controller confirms must be one of the latest."""
+        self._demanded.append((self._clock.tick(), corrections))
+
+    def _differs(self, target: str, found: Correction) -> str:
+        """Return how a confirmed correction differs from all those sent lately; empty if it does not."""
+        since, positions = self._clock.tick() - 2 * CONFIRM_WITHIN * self._clock.speed, (0.0, found.reference_position)
+        lately = [c[target] for at, c in self._demanded if target in c and at >= since]
+        lately = lately or [c[target] for _, c in list(self._demanded)[-1:] if target in c]
+        for p in positions if lately else ():
+            low, high = min(c.at(p) for c in lately), max(c.at(p) for c in lately)
+            if not low - ASIDE <= found.at(p) <= high + ASIDE:
+                return f"the controller has {found.at(p):+.1f} um in force, where {lately[-1].at(p):+.1f} um were sent"
+        return ""
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:
         """Return the correction in force: recently confirmed, or demanded if no sink confirms; None if unknown."""
@@ -62,8 +82,11 @@ class ConfirmedCorrections:
         found, at = self.confirmed.get(target, (None, -math.inf))
         age = (self._clock.tick() - at) / self._clock.speed
         if found is None or age > CONFIRM_WITHIN:
-            return AtController("not confirmed", f"{controllers[0].name} has not reported the correction in force")
-        if alarm := self._alarms.get(target):
+            topic = getattr(controllers[0].sink, "confirm_topic", "") or controllers[0].name
+            out = "no report of the correction in force" if found is None else f"the last report is {age:.0f} s old"
+            return AtController("not confirmed", f"{topic}: {out}")
+        own = isinstance(controllers[0].sink, Suspending)  # compares demand and correction itself
+        if alarm := self._alarms.get(target, "") if own else self._differs(target, found):
             return AtController("not confirmed", alarm, found, age)
         return AtController("confirmed", "", found, age)
 

@@ -9,12 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.ports import Probe, Remembering, Sink, Source, Suspending, TargetStatus
+from thermocomp.core.ports import Confirming, Probe, Remembering, Sink, Source, Suspending, TargetStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
 from thermocomp.live.events import Events
-from thermocomp.live.inforce import ConfirmedCorrections, suspensions
+from thermocomp.live.inforce import ConfirmedCorrections, confirms, suspensions
 from thermocomp.live.keeper import CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
@@ -70,6 +70,7 @@ class Service:
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
         self._heard = self.clock.tick()
         self._untimely = "", -math.inf  # why the stamp of a reading was invalid, and when
+        self._told_untimely, self._begun, self._there = -math.inf, False, dict[str, str]()
 
     # -- interface -----------------------------------------------------------------------------------------------------
 
@@ -104,9 +105,10 @@ class Service:
         stamp, most = self.clock.of(reading.time), self.compensator.limits.reading_age
         if why := explain_stamp(stamp, now, most):
             self.counts["rejected"] += 1
-            if tick - self._untimely[1] > SELDOM * self.clock.speed:
+            if tick - self._told_untimely > SELDOM * self.clock.speed:
                 self.say("link", f"readings are not used: {why}")
-                self._untimely = why, tick
+                self._told_untimely = tick
+            self._untimely = why, tick
             return
         if left_out := self.latest.take(reading.values, tick, most, tick - max(now - stamp, 0.0)):
             self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
@@ -135,6 +137,8 @@ class Service:
     def start_from_zero(self, target: str) -> str:
         """Start a target whose correction in force is unknown: a person states that it is zero; return why not."""
         order = self.state.orders.get(target)
+        if not self._begun:
+            return "the sinks are still being asked for the correction in force: wait some seconds"
         if order is None or order.word not in UNKNOWN:
             return "the correction in force is known"
         self.state = start_from(self.compensator, self.state, target, Correction(0.0))
@@ -185,7 +189,7 @@ class Service:
     def untimely(self) -> str:
         """Why readings were not used lately because of their time stamps; empty if all were valid."""
         why, at = self._untimely
-        return why if self.clock.tick() - at <= 2 * SELDOM * self.clock.speed else ""
+        return why if self.clock.tick() - at <= 10.0 * self.clock.speed else ""
 
     def links(self) -> list[Link]:
         """Return the links of sources, probes and sinks, in this order."""
@@ -214,26 +218,48 @@ class Service:
             if waits or self.keeper.resumed or not any(o.receives(target) for o in self.outlets):
                 continue
             first = self.keeper.first
-            if (self.first_start if first else self.at_unknown) == "zero":
+            if self._zero_allowed and self._asked(target):
                 continue
             self.state = wait_for_start(self.state, target, WAITS[first])
             self.say("state", f"{target} {WAITS[first].word}: {WAITS[first].reason}")
+        self._begun = True
+
+    @property
+    def _zero_allowed(self) -> bool:
+        """Whether a target starts from zero if no sink knows its correction in force."""
+        return (self.first_start if self.keeper.first else self.at_unknown) == "zero"
+
+    def _asked(self, target: str) -> bool:
+        """Return whether a sink that may know the correction in force was asked; one out of reach blocks no other."""
+        may = [o.sink for o in self.outlets if o.receives(target) and isinstance(o.sink, Confirming | Remembering)]
+        return not may or any(sink is asked for asked in self.start_values.asked for sink in may)
 
     async def _learn_start(self) -> None:
         """Start targets that wait, once a sink that was out of reach at the start knows what it was sent last."""
         waiting = {t for t, o in self.state.orders.items() if o.word in UNKNOWN}
         for outlet in self.outlets if waiting else ():
-            if isinstance(outlet.sink, Remembering) and outlet.status().state == "connected":
+            if outlet.status().state != "connected":
+                continue
+            if isinstance(outlet.sink, Remembering):
                 found = self.start_values.within_limits(await outlet.sink.last_sent() or {})
                 for target in waiting & found.keys():
                     self.state = start_from(self.compensator, self.state, target, found[target])
                     self.state = self.state._replace(away=math.nan)
                     self.say("state", f"{target} starts from {found[target].offset:+.1f} um, as last sent")
+            if not confirms(outlet.sink) and not any(outlet.sink is asked for asked in self.start_values.asked):
+                self.start_values.asked.append(outlet.sink)
+        for target in waiting if self._zero_allowed else ():
+            order = self.state.orders.get(target)
+            if order is not None and order.word in UNKNOWN and self._asked(target):
+                self.state = start_from(self.compensator, self.state, target, Correction(0.0))
+                self.say("state", f"{target} starts from zero, as configured: no sink knows a correction in force")
 
     def _put(self, corrections: Mapping[str, Correction], statuses: Mapping[str, TargetStatus] | None = None) -> None:
         """Hand corrections to all sinks, but none for a target whose correction in force is unknown."""
         orders = self.state.orders
         known = {t: c for t, c in corrections.items() if t not in orders or orders[t].word not in UNKNOWN}
+        if known:
+            self.in_force.demand(known)
         for outlet in self.outlets if known else ():
             outlet.put(known, statuses)
 
@@ -249,6 +275,13 @@ class Service:
             if self._ending:
                 continue
             await self._learn_start()
+            for target in self.compensator.lines:  # what was confirmed, and is no longer, or again
+                if any(isinstance(o.sink, Suspending) and o.receives(target) for o in self.outlets):
+                    continue  # it reports its alarms itself
+                there = self.in_force.at_controller(target, self.outlets)
+                if there.word != self._there.get(target, there.word):
+                    self.say("link", f"{target} {there.word}" + (f": {there.reason}" if there.reason else ""))
+                self._there[target] = there.word
             if silent > max(2.0, 2.0 * self.clock.speed):
                 why = f"no reading for {silent:.0f} s" + (f": {self.untimely}" if self.untimely else "")
                 self.state, said = self.compensator.wait(self.state, tick, why)

@@ -1,5 +1,6 @@
 """Corrections in force when the service starts: confirmed by the controller, or as last sent by an earlier run."""
 
+import asyncio
 from collections.abc import Mapping
 from typing import Literal
 
@@ -12,6 +13,9 @@ from thermocomp.runtime.state import Status
 
 #: what is done if the correction in force is unknown
 AtStart = Literal["order", "zero"]
+
+#: time for which a controller is awaited at the start [0.1 s]
+WAIT = 30
 
 #: status of a target that waits: at a later start, and at the first one
 WAITS = {
@@ -28,6 +32,7 @@ class StartValues:
     def __init__(self, compensator: Compensator) -> None:
         self._compensator = compensator
         self._confirmed, self._sent = dict[str, Correction](), dict[str, Correction]()
+        self.asked = list[Sink]()  #: sinks that have answered, also with nothing
 
     async def ask(self, sink: Sink) -> None:
         """Connect a sink and ask it for the corrections in force."""
@@ -35,13 +40,20 @@ class StartValues:
             return
         await sink.connect(TIMEOUT)
         if isinstance(sink, Confirming):
-            found = self.within_limits(await sink.confirmed() or {})
+            report = await sink.confirmed()
+            for _ in range(WAIT if confirms(sink) else 0):  # what the controller says goes before what was sent
+                if report is not None:
+                    break
+                await asyncio.sleep(0.1)
+                report = await sink.confirmed()
+            found = self.within_limits(report or {})
             if confirms(sink):
                 self._confirmed |= found
             else:
                 self._sent |= found
         if isinstance(sink, Remembering):
             self._sent |= self.within_limits(await sink.last_sent() or {})
+        self.asked.append(sink)
 
     def of(self, target: str) -> Correction | None:
         """Return the correction in force, confirmed or else as last sent; None if no sink knows it."""

@@ -165,6 +165,8 @@ class MqttSink(Broker):
     """
 
     confirm_topic: str = ""
+    refused: int = field(default=0, init=False)  #: number of invalid messages
+    last_refusal: str = field(default="", init=False)
     _statuses: dict[str, TargetStatus] = field(default_factory=dict, init=False, repr=False)
     _sequence: int = field(default=0, init=False, repr=False)
     _before: dict[str, Correction] | None = field(default=None, init=False, repr=False)
@@ -207,7 +209,9 @@ class MqttSink(Broker):
                 payload = message.payload if isinstance(message.payload, bytes | str) else b""
                 try:
                     found = read_corrections(payload)
-                except ReadingError:
+                except ReadingError as e:
+                    if not message.topic.matches(f"{self.topic}/status"):
+                        self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
                     continue
                 if message.topic.matches(self.topic):
                     if message.retain:
@@ -232,7 +236,8 @@ class MqttSink(Broker):
         self._sequence += 1
         text = write_message(corrections, time.time(), self._statuses, self._sequence)
         try:
-            await self._connected().publish(self.topic, text, qos=0, retain=True, timeout=5.0)
+            # acknowledged: a broker that does not answer is found
+            await self._connected().publish(self.topic, text, qos=1, retain=True, timeout=3.0)
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             raise self._fail(e) from e
 

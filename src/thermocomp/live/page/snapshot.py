@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from thermocomp.core.ports import Probe
+from thermocomp.live.inforce import AtController
 from thermocomp.live.links import Link, Outlet
 from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
@@ -79,7 +80,8 @@ def find_alarms(service: Service) -> Iterator[str]:
     if service.untimely:
         yield f"readings are not used: {service.untimely}"
     if said is not None and said.rejected:
-        yield f"the last reading was rejected: {said.rejected}"
+        silent = said.rejected.startswith("no reading")
+        yield said.rejected if silent else f"the last reading was rejected: {said.rejected}"
     for name, fault in (said.failed if said else {}).items():
         yield f"{name} {fault}"
     if service.keeper.not_saved and service.keeper.configured:
@@ -117,6 +119,8 @@ def _target(service: Service, name: str, line: DeviationLine, settled: float) ->
     there = service.in_force.at_controller(name, service.outlets)
     word: str = status.word if status else "restarting"
     reason = status.reason if status else "waits for its first reading"
+    if (order := service.state.orders.get(name)) is not None and order.word in UNKNOWN:
+        word, reason, there = order.word, order.reason, AtController("not sent", order.reason)
     if word == "active" and there.word != "confirmed":
         word, reason = there.word, there.reason
     return {
