@@ -1,9 +1,11 @@
 """Fixtures shared by all tests."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from broker import Mosquitto
 from driftmodels import lags
 from hypothesis import settings
 from reviseruns import PLATE, judged, write_models
@@ -63,3 +65,12 @@ def job_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_models([judged(lags("z_um"))], "model.json")
     Path("part.ngc").write_text(PLATE, encoding="ascii")
     return tmp_path
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator[Mosquitto]:
+    """Return a running mosquitto."""
+    found = Mosquitto(tmp_path)
+    found.start()
+    yield found
+    found.kill()
