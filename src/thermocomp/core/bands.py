@@ -33,13 +33,16 @@ class Bands:
             )
             for name in ("running", "stopped")
         )
-        # models mostly have the same speeds: each set of positions and threshold is compared once
+        # models mostly have the same speeds: each position and threshold is compared once
         speeds = [
-            (tuple(own[list(m.band.speeds)].tolist()) if m.band else (), m.thresholds.stopped_speed)
+            {(place, m.thresholds.stopped_speed) for place in own[list(m.band.speeds)].tolist()} if m.band else set()
             for m, own in zip(models, taps, strict=True)
         ]
-        self._turns = [(np.array(own, dtype=np.intp), most) for own, most in dict.fromkeys(speeds)]
-        self._of = [list(dict.fromkeys(speeds)).index(own) for own in speeds]
+        each = sorted(set().union(*speeds))
+        self._speeds = np.array([place for place, _ in each], dtype=np.intp)
+        self._most = np.array([most for _, most in each])
+        of = [one in own for one in each for own in speeds]
+        self._of = np.array(of, dtype=np.bool_).reshape(len(each), len(models))
 
     def half_widths(self, change: FloatArray, spreads: FloatArray) -> FloatArray:
         """Return the half-widths, (..., n_models); nan for a model without a band.
@@ -51,6 +54,6 @@ class Bands:
         spreads : ndarray of shape (..., n_spreads)
             Spreads of all models, in their order [their units].
         """
-        turns = np.stack([(np.abs(change[..., own]) > most).any(axis=-1) for own, most in self._turns], axis=-1)
-        factor = np.where(turns[..., self._of], self._running, self._stopped)
+        turns = (np.abs(change.take(self._speeds, axis=-1)) > self._most) @ self._of
+        factor = np.where(turns, self._running, self._stopped)
         return np.asarray(factor * np.sqrt(self._floor + spreads**2 @ self._sums))

@@ -42,14 +42,12 @@ class Lags(NamedTuple):
     def advance(self, values: FloatArray, memory: FloatArray, dt: float) -> None:
         """Move the lags towards their signals in the time `dt`; infinite: to the steady state."""
         signals = self.signals.evaluate(values)
-        if dt == np.inf:
-            memory[..., self.memory] = signals
-        else:
+        if dt != np.inf:
             held = memory[..., self.memory]
             signals -= held
             signals *= np.expm1(-dt * self._rates(values))
-            memory[..., self.memory] = held - signals
-        values[..., self.slots] = memory[..., self.memory]
+            signals = held - signals
+        memory[..., self.memory] = values[..., self.slots] = signals
 
     def follow(self, values: FloatArray, memory: FloatArray, steps: FloatArray) -> None:
         """Move the lags through several readings, (n_readings, ..., n_slots)."""
