@@ -15,7 +15,7 @@ from thermocomp.runtime.state import HELD, CompensatorState, Reference, Status
 ACTIVE = Status("active")
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Driven:
     """Changes by one reading, by target; see `CompensatorState` and `Compensated`."""
 

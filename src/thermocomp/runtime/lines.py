@@ -74,15 +74,16 @@ def evaluate(
         Largest permitted correction [um]; no probing changes the deviation by more.
     """
     first, end = line.models.start, line.models.stop
-    thresholds = models[first].thresholds
-    raw, refused, moved, single = line.deviation(spoken.said[first:end]), "", 0.0, end == first + 1
+    lead, single = models[first], end == first + 1
+    raw = line.deviation(spoken.said[first:end])
     deviation = raw.less(zero) if zero.offset or zero.slope else raw
-    width, band = math.nan, models[first].band if single else None
+    width, band = math.nan, lead.band if single else None
     if band is not None:
-        width = spoken.half_widths[first] * (models[first].widening(failed) if failed else 1.0)
+        width = spoken.half_widths[first] * (lead.widening(failed) if failed else 1.0)
     if learned is None and probing is None:
         return Said(deviation=deviation, half_width=width, learned=None, refused="", moved=0.0, raw=raw)
-    directions = models[first].directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
+    thresholds, refused, moved = lead.thresholds, "", 0.0
+    directions = lead.directions(spoken.states[first], spoken.values[first]) if single else np.zeros(0)
     wanted = deviation
     if learned is not None:
         wanted = replace(deviation, offset=deviation.offset + float(learned.shift(time, directions, thresholds)))
