@@ -164,7 +164,8 @@ def test_a_file_with_the_readings_of_the_zero_goes_on_as_without_a_restart() -> 
     whole, without = go_on(machine, state, 0)
     state, done = go_on(machine, found, 5)
     references = {t: r._replace(why=whole.references[t].why) for t, r in state.references.items()}  # worded differently
-    assert same(state._replace(references=references), whole)
+    assert np.isnan(state.zeroed)
+    assert same(state._replace(references=references, zeroed=whole.zeroed), whole)
     assert [d.corrections for d in done] == [d.corrections for d in without[5:]]
     assert done[-1].corrections["z_um"].offset != 0.0
 

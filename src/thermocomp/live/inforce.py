@@ -10,7 +10,7 @@ from thermocomp.core.ports import Confirming, Sink, Suspending
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.links import Outlet
 from thermocomp.live.recorder import CONFIRM_WITHIN
-from thermocomp.runtime.state import CompensatorState, Status
+from thermocomp.runtime.state import NO_ZERO, CompensatorState, Status
 
 #: difference from the corrections sent lately above which another one is in force [um]
 ASIDE = 1.0
@@ -111,7 +111,7 @@ def suspensions(
     away = sink.suspended()
     for target in state.corrections.keys() & (in_force.keys() | away.keys()):
         order = state.orders.get(target)
-        if target in away and (order is None or order.word not in ("suspended", "shadow", "holding")):
+        if target in away and (order is None or order.word not in ("suspended", "shadow", "holding", NO_ZERO)):
             yield target, Status("suspended", away[target])
         elif target not in away and order is not None and order.word == "suspended":
             yield target, None

@@ -1,18 +1,24 @@
 """State file of a service: read at the start, set aside if unusable, written while the service runs."""
 
 import contextlib
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.live import statefile
 from thermocomp.live.clock import ServiceClock
+from thermocomp.live.storedzero import StateOfOthers, StoredZero
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.state import CompensatorState, resume, silence
+from thermocomp.runtime.state import NO_ZERO, UNKNOWN, CompensatorState, Status, resume, silence
 
 #: reason why a target runs in shadow: by configuration
 CONFIGURED = "by configuration"
+
+#: orders that remain although there is no zero: the correction is not in force, or not known
+_STRONGER = ("shadow", *UNKNOWN)
+_ASKED = "let the machine cool down, set its zero anew, then order 're-zero'"
 
 
 class StateKeeper:
@@ -33,8 +39,16 @@ class StateKeeper:
         self._refused: Path | None = None
         #: reason why the last save failed; empty if it succeeded
         self.not_saved = ""
-        #: whether the state comes from the file, and whether there was no file
-        self.resumed, self.first, self.configured = False, True, path is not None
+        #: whether there was no file
+        self.first, self.configured = True, path is not None
+        #: targets whose correction in force comes from the file
+        self.known: frozenset[str] = frozenset()
+        #: zero of other models that is to be taken over
+        self.pending: StateOfOthers | None = None
+        #: order of targets whose models have no valid zero
+        self.no_zero: Status | None = None
+        self._zero: StoredZero | None = None
+        self._age = self._begun = 0.0  # age of the state when it was read, and the time of the clock [s]
 
     def begin(self) -> CompensatorState:
         """Return the initial state of the compensator: from the file, or that of a cold start."""
@@ -52,18 +66,66 @@ class StateKeeper:
                 raise InputError(
                     f"{self._path}: this is not a state file and would be overwritten; name another file"
                 ) from e
+            if (others := statefile.read_zero(self._path)) is not None:
+                return self._begin_with_others(others, cold)
             self._say(f"cold start: {e}")
             self._refused = self._path
             return cold
-        age = (datetime.now(UTC) - saved.written).total_seconds() * self._clock.speed
-        state = resume(saved.state, cold, age, None, self._clock.tick(), self._compensator.thresholds.resumable)
-        # orders by the controller or the configuration are not restored: they are issued again
-        own = {t: o for t, o in state.orders.items() if o.word != "suspended" and o.reason != CONFIGURED}
-        self.resumed = True
-        state = state._replace(orders=cold.orders | own)
+        age, self._zero = self._date(saved.written), None if saved.others is None else saved.others.zero
+        most = self._compensator.thresholds.resumable
+        state, recent = resume(saved.state, cold, age, None, self._begun, most), 0.0 <= age <= most
+        self.known = frozenset(state.corrections)
+        state = state._replace(orders=cold.orders | _restored(state.orders, cold=not recent))
+        if recent and self._zero is not None and self._zero.begun != state.zeroed:
+            held = [o for o in state.orders.values() if o.word == NO_ZERO]
+            state = self._hold(state, held[0].reason if held else f"these models took their zero warm: {_ASKED}")
         how = "continues" if state.references else "starts again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
         return state
+
+    def _date(self, written: datetime) -> float:
+        """Return the age of a state that was just read [s]."""
+        self._begun = self._clock.tick()
+        self._age = (datetime.now(UTC) - written).total_seconds() * self._clock.speed
+        return self._age
+
+    def _begin_with_others(self, others: StateOfOthers, cold: CompensatorState) -> CompensatorState:
+        """Return a cold start from the corrections in force at other models; `take_over` adds their zero."""
+        age, lines, most = self._date(others.written), self._compensator.lines, self._compensator.limits.magnitude
+        targets = {t: s for t, s in others.zero.targets.items() if t in lines}
+        found = {t: s.correction for t, s in targets.items()}
+        found = {t: c for t, c in found.items() if max(abs(c.at(p)) for p in lines[t].travel) <= most}
+        orders = _restored({t: s.order for t, s in targets.items() if s.order is not None}, cold=True)
+        orders = {t: o for t, o in orders.items() if t not in cold.orders or o.word in UNKNOWN}
+        self.known, self._zero = frozenset(found), others.zero
+        if 0.0 <= age <= self._compensator.thresholds.resumable:
+            self.pending = others
+            self._say(f"start with other models after {age:.0f} s: they take over the zero of {others}")
+        else:
+            self._say(f"cold start: {others} belongs to other models, and is {age:.0f} s old")
+        return cold._replace(
+            corrections=cold.corrections | found, orders=cold.orders | orders, away=age if age >= 0.0 else math.nan
+        )
+
+    def take_over(self, state: CompensatorState, rebuilt: CompensatorState | str) -> CompensatorState:
+        """Return the state of new models with the corrections in force; or hold these, if something is missing."""
+        zero, self.pending = self._zero, None
+        if isinstance(rebuilt, str):
+            self._say(f"the models have no valid zero: {rebuilt}")
+            return self._hold(state, f"{rebuilt}: {_ASKED}")
+        self._say("the slow states are rebuilt from the journal")
+        assert zero is not None
+        assert rebuilt.time is not None
+        age = self._age + max(zero.read - rebuilt.time - rebuilt.origin, 0.0)
+        why = "the models are new: the correction moves to theirs"
+        kept = rebuilt._replace(orders=state.orders, because=why if age <= self._compensator.limits.hold else "")
+        return resume(kept, state, age, state.corrections, self._begun, math.inf)
+
+    def _hold(self, state: CompensatorState, why: str) -> CompensatorState:
+        """Return the state with the corrections held, until there is a valid zero; shadow comes before that."""
+        self.no_zero = Status(NO_ZERO, why)
+        free = [t for t in state.corrections if (o := state.orders.get(t)) is None or o.word not in _STRONGER]
+        return state._replace(orders=state.orders | dict.fromkeys(free, self.no_zero))
 
     def put_aside(self) -> None:
         """Rename a state file that could not be used."""
@@ -78,9 +140,23 @@ class StateKeeper:
             return
         try:
             old = timedelta(seconds=silence(state, self._clock.tick()) / self._clock.speed)
-            statefile.write(state, self._compensator, self._path, datetime.now(UTC) - old)
+            # without a valid zero, the last valid one stays in the file; the state does not begin with it, and so tells
+            before = self._zero if self.no_zero is not None or math.isnan(state.origin) else None
+            statefile.write(state, self._compensator, self._path, datetime.now(UTC) - old, before)
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
             if not self.not_saved:
                 self._say(f"the state is not saved: {e}")
             self.not_saved = str(e)
+
+
+def _restored(orders: Mapping[str, Status], *, cold: bool) -> dict[str, Status]:
+    """Return the orders that remain after a restart; those by the controller or the configuration are issued again.
+
+    Parameters
+    ----------
+    cold : bool
+        A new zero is taken, so that none is missing.
+    """
+    dropped = ("suspended", NO_ZERO) if cold else ("suspended",)
+    return {t: o for t, o in orders.items() if o.word not in dropped and o.reason != CONFIGURED}

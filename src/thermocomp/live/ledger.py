@@ -11,7 +11,7 @@ from thermocomp.live.recorder import Recorder
 from thermocomp.runtime.adaptation import Adaptation, Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.identity import KNOWN, is_known
-from thermocomp.runtime.state import Compensated, CompensatorState
+from thermocomp.runtime.state import NO_ZERO, Compensated, CompensatorState
 
 
 class ProbingLedger:
@@ -67,9 +67,12 @@ class ProbingLedger:
                 if old > 0
                 else f"the time of the measurement is {-old:.0f} s ahead of the clock"
             )
-        counted = state.references.get(target)
-        if counted is not None and self._clock.of(found.time) < counted.time:
-            return "the measurement was made before the present zero was set"
+        counted, order = state.references.get(target), state.orders.get(target)
+        early = counted is not None and self._clock.of(found.time) < counted.time
+        if early or (order is not None and order.word == NO_ZERO):
+            return (
+                "the measurement was made before the present zero was set" if early else "its model has no valid zero"
+            )
         waiting = self.waiting.get(target)
         if is_known(state, target, probing) or (waiting and set(waiting.identity) & set(probing.identity)):
             return KNOWN

@@ -19,13 +19,14 @@ from thermocomp.live.keeper import CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
 from thermocomp.live.links import SELDOM, TIMEOUT, Inlet, Link, Outlet, within
+from thermocomp.live.rebuild import rebuild
 from thermocomp.live.recorder import Recorder
 from thermocomp.live.stamps import explain_stamp
 from thermocomp.live.startvalues import WAITS, AtStart, StartValues
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.orders import order, rezero, start_from, wait_for_start, withdraw
-from thermocomp.runtime.state import UNKNOWN, Compensated, CompensatorState, Status
+from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
+from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
 
 
 @dataclass
@@ -79,6 +80,11 @@ class Service:
         self.keeper.put_aside()
         if self.recorder is not None:
             await asyncio.to_thread(self.recorder.journal.flush)
+        if (others := self.keeper.pending) is not None:  # no reading is taken meanwhile, and the file stays as it is
+            journal = None if self.recorder is None else self.recorder.journal.path
+            rebuilt = await asyncio.to_thread(rebuild, self.compensator, others, journal)
+            self.state = self.keeper.take_over(self.state, rebuilt)
+            self._dirty = True
         self.inlets = self._make_inlets()
         for sink in self.sinks:
             await within(TIMEOUT, self.start_values.ask(sink))  # on failure its link reports the reason
@@ -116,6 +122,9 @@ class Service:
         probings, learned = self.probings.take(), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
         self._heard = tick
+        for target in [t for t, o in self.state.orders.items() if o == AVERAGED and t in self.state.raw]:
+            self.state, self.keeper.no_zero = rezero(self.compensator, self.state, target, now, "new zero"), None
+            self.say("reference", f"{target} has a new zero")
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
         self._tell(said, probings)
@@ -128,6 +137,7 @@ class Service:
         """Suspend or resume a target; see `thermocomp.runtime.orders.order`."""
         before = self.state.orders.get(target)
         self.state = order(self.compensator, self.state, target, status)
+        status = self._hold_without_zero(target) or status
         if before == status:  # unchanged: no event
             return
         word = f"{status.word}: {status.reason}" if status else "runs again"
@@ -141,7 +151,7 @@ class Service:
             return "the sinks are still being asked for the correction in force: wait some seconds"
         if order is None or order.word not in UNKNOWN:
             return "the correction in force is known"
-        self.state = start_from(self.compensator, self.state, target, Correction(0.0))
+        self._start_from(target, Correction(0.0))
         self.say("state", f"{target} starts from zero, as ordered")
         self._dirty = True
         return ""
@@ -151,7 +161,15 @@ class Service:
         self.state = order(self.compensator, self.state, target, Status("shadow", CONFIGURED))
 
     def rezero(self, target: str, why: str, in_force: Correction | None = None) -> None:
-        """Reset the reference of a target; see `thermocomp.runtime.orders.rezero`."""
+        """Reset the reference of a target; see `thermocomp.runtime.orders.rezero`.
+
+        If its models have no valid zero, all targets without one are re-zeroed once a new one is averaged.
+        """
+        if (held := self.state.orders.get(target)) is not None and held.word == NO_ZERO:
+            self.state = zero_anew(self.compensator, self.state)
+            self.say("reference", f"a new zero is averaged: {why}")
+            self._dirty = True
+            return
         self.state = rezero(self.compensator, self.state, target, self.clock.now(), why, in_force)
         self.probings.forget(target)
         self.say("reference", f"{target} is re-zeroed: {why}")
@@ -209,13 +227,14 @@ class Service:
             waits = order is not None and order.word in UNKNOWN
             if known is not None:
                 if waits:
-                    self.state = start_from(self.compensator, self.state, target, known)
+                    self._start_from(target, known)
                 else:
                     self.state = self.state._replace(corrections=self.state.corrections | {target: known})
-                if not self.keeper.resumed and (known.offset or known.slope):  # not active before it has caught up
+                moves = known.offset or known.slope
+                if moves and target not in self.keeper.known:  # not active before it has caught up
                     self.state = self.state._replace(away=math.nan)
                 continue
-            if waits or self.keeper.resumed or not any(o.receives(target) for o in self.outlets):
+            if waits or target in self.keeper.known or not any(o.receives(target) for o in self.outlets):
                 continue
             first = self.keeper.first
             if self._zero_allowed and self._asked(target):
@@ -223,6 +242,18 @@ class Service:
             self.state = wait_for_start(self.state, target, WAITS[first])
             self.say("state", f"{target} {WAITS[first].word}: {WAITS[first].reason}")
         self._begun = True
+
+    def _start_from(self, target: str, in_force: Correction) -> None:
+        """Start a target from the correction in force."""
+        self.state = start_from(self.compensator, self.state, target, in_force)
+        self._hold_without_zero(target)
+
+    def _hold_without_zero(self, target: str) -> Status | None:
+        """Hold a target that would run although its models have no valid zero; return its order then."""
+        if (held := self.keeper.no_zero) is None or target in self.state.orders:
+            return None
+        self.state = wait_for_start(self.state, target, held)
+        return held
 
     @property
     def _zero_allowed(self) -> bool:
@@ -243,7 +274,7 @@ class Service:
             if isinstance(outlet.sink, Remembering):
                 found = self.start_values.within_limits(await outlet.sink.last_sent() or {})
                 for target in waiting & found.keys():
-                    self.state = start_from(self.compensator, self.state, target, found[target])
+                    self._start_from(target, found[target])
                     self.state = self.state._replace(away=math.nan)
                     self.say("state", f"{target} starts from {found[target].offset:+.1f} um, as last sent")
             if not confirms(outlet.sink) and not any(outlet.sink is asked for asked in self.start_values.asked):
@@ -251,7 +282,7 @@ class Service:
         for target in waiting if self._zero_allowed else ():
             order = self.state.orders.get(target)
             if order is not None and order.word in UNKNOWN and self._asked(target):
-                self.state = start_from(self.compensator, self.state, target, Correction(0.0))
+                self._start_from(target, Correction(0.0))
                 self.say("state", f"{target} starts from zero, as configured: no sink knows a correction in force")
 
     def _put(self, corrections: Mapping[str, Correction], statuses: Mapping[str, TargetStatus] | None = None) -> None:
@@ -326,7 +357,7 @@ class Service:
         self.in_force.confirm(known)
         for target in known.keys() & self.start_values.within_limits(known).keys():
             if (order := self.state.orders.get(target)) is not None and order.word in UNKNOWN:
-                self.state = start_from(self.compensator, self.state, target, known[target])
+                self._start_from(target, known[target])
                 self.say("state", f"{target} starts from {known[target].offset:+.1f} um, as the controller confirms")
         if self.recorder is not None:
             self.recorder.confirm(self.clock.now(), known)

@@ -12,17 +12,18 @@ import numpy as np
 from pydantic import AwareDatetime
 
 from thermocomp.core.arrays import FloatArray
-from thermocomp.core.exceptions import InputError, ModelFileError
+from thermocomp.core.exceptions import InputError, ModelFileError, ThermocompError
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.files import jsonfile
 from thermocomp.files.modelfile import entry_of, watch_entry
 from thermocomp.files.typed import decode, encode, want
+from thermocomp.live.storedzero import StateOfOthers, StoredZero, decode_zero, zero_of
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS, WatchState
 
-KIND = jsonfile.Format("thermocomp-state", 2, "state file", "thermocomp serve")
+KIND = jsonfile.Format("thermocomp-state", 3, "state file", "thermocomp serve")
 
 
 #: maximum magnitude of an error [um]
@@ -36,6 +37,7 @@ class _Stored:
     written: AwareDatetime
     models: str
     state: dict[str, Any]
+    zero: dict[str, Any] | None = None
 
 
 class _Readings(NamedTuple):
@@ -54,10 +56,13 @@ class Saved:
     ----------
     written : datetime
         In UTC.
+    others : StateOfOthers or None
+        Zero stored beside the state.
     """
 
     written: datetime
     state: CompensatorState
+    others: StateOfOthers | None = None
 
 
 def fingerprint(compensator: Compensator) -> str:
@@ -70,14 +75,17 @@ def fingerprint(compensator: Compensator) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def dumps(state: CompensatorState, compensator: Compensator, written: datetime) -> str:
-    """Return the text of a state file for a state of the compensator."""
+def dumps(
+    state: CompensatorState, compensator: Compensator, written: datetime, before: StoredZero | None = None
+) -> str:
+    """Return the text of a state file for a state of the compensator, with its zero; see `zero_of`."""
     if written.tzinfo is None:
         raise InputError(f"state of a compensator: the time of writing {written} has no time zone")
     entry = {
         "written": written.astimezone(UTC).isoformat(),
         "models": fingerprint(compensator),
         "state": encode(state),
+        "zero": encode(zero_of(state, compensator, before)),
     }
     return jsonfile.pack(KIND, [entry])
 
@@ -97,7 +105,17 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         _check(state, compensator)
     except (ValueError, InputError) as e:
         raise ModelFileError(f"{source}: not a valid state of these models: {e}; start without the file") from e
-    return Saved(stored.written, compensator.share(state.models, state))
+    return Saved(stored.written, compensator.share(state.models, state), decode_zero(stored.zero, stored.written))
+
+
+def read_zero(path: str | Path) -> StateOfOthers | None:
+    """Return the zero in a state file, whatever its models; None if it cannot be used."""
+    try:
+        text, source = jsonfile.read(KIND, path)
+        stored = jsonfile.unpack(KIND, _Stored, text, source).models[0]
+    except ThermocompError:
+        return None
+    return decode_zero(stored.zero, stored.written)
 
 
 def _of_version_1(entry: dict[str, Any]) -> dict[str, Any]:
@@ -129,9 +147,15 @@ def _mean(entry: Any, place: str) -> Any:
     return encode(averaged)
 
 
-def write(state: CompensatorState, compensator: Compensator, path: str | Path, written: datetime) -> None:
+def write(
+    state: CompensatorState,
+    compensator: Compensator,
+    path: str | Path,
+    written: datetime,
+    before: StoredZero | None = None,
+) -> None:
     """Replace the state file; after a kill either the old or the new state is complete. Only its owner may read it."""
-    jsonfile.write(dumps(state, compensator, written), path, overwrite=True)
+    jsonfile.write(dumps(state, compensator, written, before), path, overwrite=True)
     Path(path).chmod(0o600)
 
 

@@ -38,7 +38,7 @@ from thermocomp.runtime.group import Group
 from thermocomp.runtime.identity import remember, sift
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
-from thermocomp.runtime.state import Compensated, CompensatorState, Reference, Status
+from thermocomp.runtime.state import NO_ZERO, Compensated, CompensatorState, Reference, Status
 from thermocomp.runtime.watch import WatchState, begin
 
 
@@ -264,6 +264,8 @@ class Compensator:
             references=done.references,
             raw=done.raw,
             away=None if done.arrived else state.away,
+            because="" if done.arrived else state.because,
+            zeroed=reading.time if state.time is None and not state.references else state.zeroed,
             time=instant.time,
             origin=instant.origin,
             taken=left.clock,
@@ -301,7 +303,8 @@ class Compensator:
         done = Driven.begin(state, fresh)
         for target, line in self.lines.items():
             if not all(map(math.isfinite, stepped.said[line.models])):
-                done.states[target] = Status("restarting", "its zero is being averaged")
+                order, averaged = state.orders.get(target), Status("restarting", "its zero is being averaged")
+                done.states[target] = order if order is not None and order.word == NO_ZERO else averaged
                 continue
             if target not in done.references:
                 done.references[target] = Reference(times[0], "mean over the first readings after the start")

@@ -87,7 +87,8 @@ def drive(
     after = limit_line(wanted, before, line.travel, travel, limits)
     if state.away is not None and _apart(wanted, after, line.travel) > max(near, limits.dead_band):
         out = "an unknown time" if math.isnan(state.away) else f"{state.away:.0f} s"
-        return after, Status("restarting", f"compensation did not run for {out}; measure with the probe, or re-zero")
+        why = state.because or f"compensation did not run for {out}; measure with the probe, or re-zero"
+        return after, Status("restarting", why)
     return after, ACTIVE
 
 

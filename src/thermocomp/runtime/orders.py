@@ -6,7 +6,7 @@ from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import limit_line
-from thermocomp.runtime.state import CompensatorState, Reference, Status
+from thermocomp.runtime.state import NO_ZERO, CompensatorState, Reference, Status
 
 
 def withdraw(compensator: Compensator, state: CompensatorState, passed: float) -> CompensatorState:
@@ -67,6 +67,17 @@ def start_from(
     return state._replace(orders=orders, corrections=state.corrections | {target: in_force})
 
 
+#: order of a target without a valid zero while a new one is averaged
+AVERAGED = Status(NO_ZERO, "a new zero was ordered, and is being averaged")
+
+
+def zero_anew(compensator: Compensator, state: CompensatorState) -> CompensatorState:
+    """Start all models anew, to take a new zero; corrections are kept. Targets without a zero wait for `rezero`."""
+    orders = {t: AVERAGED if s.word == NO_ZERO else s for t, s in state.orders.items()}
+    begun = compensator.start()
+    return begun._replace(corrections=state.corrections, orders=orders, clock=state.clock, probed=state.probed)
+
+
 def rezero(
     compensator: Compensator,
     state: CompensatorState,
@@ -86,7 +97,7 @@ def rezero(
     """
     if target not in compensator.lines:
         raise InputError(f"there is no target {target}: expected one of {', '.join(compensator.lines)}")
-    if target not in state.references:
+    if target not in state.raw:
         raise InputError(f"{target}: its zero is still being averaged; wait until the zero is known")
     now, correction = state.raw[target], in_force or state.corrections[target]
     at = now.reference_position
@@ -95,4 +106,5 @@ def rezero(
         references=state.references | {target: Reference(time, why, shift)},
         corrections=state.corrections | {target: correction},
         learned={t: a for t, a in state.learned.items() if t != target},
+        orders={t: s for t, s in state.orders.items() if t != target or s.word != NO_ZERO},
     )

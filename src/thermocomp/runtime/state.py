@@ -12,10 +12,13 @@ from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.watch import WatchState
 
-Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "unknown", "first start"]
-#: orders under which a correction is held; under the last two the correction in force is not known
-HELD: tuple[Word, ...] = ("holding", "suspended", "unknown", "first start")
-UNKNOWN: tuple[Word, ...] = HELD[2:]
+Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "no zero", "unknown", "first start"]
+#: order of a target whose models have no valid zero: its correction is held until it is re-zeroed
+NO_ZERO: Word = "no zero"
+#: orders under which the correction in force is not known
+UNKNOWN: tuple[Word, ...] = ("unknown", "first start")
+#: orders under which a correction is held
+HELD: tuple[Word, ...] = ("holding", "suspended", NO_ZERO, *UNKNOWN)
 
 
 class Status(NamedTuple):
@@ -56,6 +59,8 @@ class CompensatorState(NamedTuple):
     away: float | None  #: outage before the last restart; None once corrections have caught up [s]
     #: first arrival time of each key of a probing, by target or axis [s]
     probed: Mapping[str, dict[str, float]] = MappingProxyType({})
+    zeroed: float = math.nan  #: stamp of the first reading of the zero; nan: unknown [s]
+    because: str = ""  #: why corrections have to catch up; empty: because of the outage `away`
 
 
 class Compensated(NamedTuple):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.live.journal.journalrows import KINDS, Row, StartRow, loads
+from thermocomp.live.journal.journalrows import KINDS, ReadingRow, Row, StartRow, loads
 
 #: application id ``tcJl``, and version of the tables
 APPLICATION, VERSION = 0x74634A6C, 1
@@ -91,6 +91,31 @@ class JournalReader:
                 if stored.seq or stored.run not in begun:
                     begun |= {stored.run} if not stored.seq else set()
                     yield stored
+
+    def readings(self, since: float, interval: Callable[[float], float]) -> list[ReadingRow]:
+        """Return the readings since a time in order of time, at most one per interval, and the last one.
+
+        Parameters
+        ----------
+        interval : callable
+            Returns the minimum interval after a reading at a given time [s].
+
+        Raises
+        ------
+        InputError
+            Since that time, the clock was set back: the order of the readings is known, but not the time between them.
+        """
+        kept, last = list[tuple[Path, Any]](), None
+        for path, found in self._each(f"{_ROWS} WHERE kind = 'reading' AND time >= {since!r} ORDER BY id"):
+            if last is not None and found[2] < last[1][2] - SET_BACK:
+                raise InputError(f"{path}: the clock was set back at row {found[1]} of run {found[0]}")
+            if not kept or found[2] - kept[-1][1][2] >= interval(kept[-1][1][2]):
+                kept.append((path, found))
+            last = path, found
+        if last is not None and last[1][2] > kept[-1][1][2]:
+            kept.append(last)
+        rows = [self._row(path, *found).row for path, found in kept]
+        return [row for row in rows if isinstance(row, ReadingRow)]
 
     def overtaken(self) -> Callable[[StoredRun], bool]:
         """Return a predicate for rows whose times occur again in later rows, because a clock was set back.

@@ -11,7 +11,7 @@ from thermocomp.core.strictjson import parse_json
 from thermocomp.live.loop import Service
 from thermocomp.live.page.doors import Json
 from thermocomp.live.page.pages import Board
-from thermocomp.runtime.state import UNKNOWN, Status
+from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Status
 
 
 class PageOrder(BaseModel):
@@ -61,7 +61,7 @@ def give(service: Service, wanted: PageOrder) -> str:
     target, waiting = wanted.target, service.state.orders.get(wanted.target)
     if wanted.do == "start":
         return service.start_from_zero(target)
-    if waiting is not None and waiting.word in UNKNOWN:
+    if waiting is not None and (waiting.word in UNKNOWN or (waiting.word == NO_ZERO and wanted.do != "rezero")):
         return f"{waiting.word}: {waiting.reason}"
     if wanted.do == "rezero":
         service.rezero(target, "by hand, on the page")

@@ -10,12 +10,12 @@ from thermocomp.live.links import Link, Outlet
 from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
 from thermocomp.runtime.lines import DeviationLine
-from thermocomp.runtime.state import UNKNOWN
+from thermocomp.runtime.state import NO_ZERO, UNKNOWN
 
 #: states of a target, the one that needs attention most first
 ORDER = (
-    *("unknown", "first start", "not confirmed", "fading", "holding", "suspended", "not sent", "restarting", "shadow"),
-    *("sent, not confirmed", "active"),
+    *("unknown", "first start", "no zero", "not confirmed", "fading", "holding", "suspended", "not sent"),
+    *("restarting", "shadow", "sent, not confirmed", "active"),
 )
 
 
@@ -70,7 +70,7 @@ def find_alarms(service: Service) -> Iterator[str]:
     for name in service.compensator.lines:
         there = service.in_force.at_controller(name, service.outlets)
         order = service.state.orders.get(name)
-        if order is not None and order.word in UNKNOWN:
+        if order is not None and order.word in (*UNKNOWN, NO_ZERO):
             yield f"{name}: {order.word}: {order.reason}"
         elif there.word == "not confirmed" and name not in service.compensator.shadow:
             yield f"{name}: not confirmed: {there.reason}"
