@@ -136,7 +136,7 @@ def test_sensors_that_fail(
     said = replay(compensator, double.tables, readings)
     check_same(said, double.run(readings))
     check_same(said, single.run(readings), 2e-4)
-    assert said.fault.max(axis=0).tolist() == found
+    assert said.fault.max(axis=0).tolist() == [*found, 0]  # the speed is right
     assert (said.status[-1] > 1).all() == (found[2] > 0)  # without t3_C it does harm: held, then faded
 
 

@@ -62,6 +62,8 @@ def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
     for damage in (first, *[_no_start] * (seed % 5 == 3 or seed % 4 == 0), *more):
         with np.errstate(invalid="ignore"):  # infinity less infinity
             damage(rng, values[rest:], channels)
+    if seed % 3 == 1:
+        _wrong_speed(rng.spawn(1)[0], values[rest:], channels)
     age = draw_ages(rng, dt, limits, steady=steady)
     age[:rest] = 0.0
     clock, resumed = np.zeros(count), np.zeros(count, dtype=np.bool_)
@@ -223,6 +225,18 @@ def _strange_speeds(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> 
         if c.quantity == "spindle_speed":
             for _ in range(3):
                 values[_spell(rng, len(values), 0.03), k] = rng.choice(SPEEDS)
+
+
+def _wrong_speed(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
+    """Let the speed that heats the machine read 0, half, in 1/s, or always the same; now and then it is missing."""
+    for k, c in enumerate(channels):
+        if c.name == SPEED:
+            later, short = slice(int(rng.integers(0, len(values) // 2)), None), _spell(rng, len(values), 0.1)
+            right = values[later, k].copy()
+            same = np.ones_like(right)
+            wrong = [0.0 * same, right / 2, right / 60, right[0] * same, 2.5 * TOP * same]
+            values[later, k] = wrong[int(rng.integers(len(wrong)))]
+            values[short, k] = np.nan
 
 
 def _no_start(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:

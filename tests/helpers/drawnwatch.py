@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.bounds import GAP
+from thermocomp.core.heatcheck import HeatCheck
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch, Watched
@@ -61,6 +62,35 @@ def draw_watch(rng: Rng, plant: "Plant", inputs: Sequence[Input], speed: Input, 
         states=states,
         sensors=sensors,
         pace=float(rng.choice([30.0, 60.0])),
+        checks=draw_checks(rng.spawn(1)[0], plant.power, np.stack([rise, room]), len(taus), n) if states else (),
+    )
+
+
+def draw_checks(rng: Rng, power: float, effects: FloatArray, lags: int, speed: int) -> tuple[HeatCheck, ...]:
+    """Return checks of a speed; the temperatures show its heat after lags, and not the room, whatever their weights.
+
+    Parameters
+    ----------
+    power : float
+        Of the heat of the machine.
+    effects : ndarray of shape (2, n_temperatures)
+        Of the heat and of the room.
+    lags : int
+        Lags of each temperature.
+    speed : int
+        Index of the input.
+    """
+    base = np.linalg.pinv(effects)[:, 0]
+    return tuple(
+        HeatCheck(
+            input=speed,
+            power=exponent,
+            lag=float(rng.uniform(100.0, 900.0)),
+            weights=tuple(np.concatenate([s * base for s in rng.dirichlet([4.0] + [1.0] * lags)]).tolist()),
+            off=float(rng.uniform(0.15, 0.6)),
+            unseen=float(rng.choice([0.02, 0.1])),
+        )
+        for exponent in rng.permutation([0.1, power])[: int(rng.integers(0, 3))].tolist()
     )
 
 
@@ -75,6 +105,6 @@ def _mix(rng: Rng, room: FloatArray) -> FloatArray:
 
 def draw_lost(rng: Rng, model: ErrorModel, watch: Watch | None) -> dict[str, float]:
     """Return errors of a model without one, two or three of its sensors: some below what it may have, some not."""
-    own = [] if watch is None else [i.name for i in model.inputs if i.name in watch.names]
+    own = [] if watch is None else [i.name for i in model.inputs if i.name in watch.failing]
     few = [c for count in (1, 2, 3) for c in combinations(own, count)]
     return {", ".join(c): float(rng.choice([1.0, 4.0, 9.0], p=[0.6, 0.2, 0.2])) for c in few if rng.random() < 0.9}

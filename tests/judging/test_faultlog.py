@@ -51,7 +51,7 @@ def test_it_is_what_the_compensator_says_live(model: ErrorModel, cuts: dict[str,
     failed, said, _ = live(model, recording)
     assert set(log.failed) == set(cuts)
     for row, told in enumerate(failed):
-        assert {n for n, f in zip(log.watch.names, log.fault[row], strict=True) if f != GOOD} == set(told)
+        assert {n for n, f in zip(log.watch.failing, log.fault[row], strict=True) if f != GOOD} == set(told)
     for f in log.faults:
         began = next(k for k, told in enumerate(failed) if told.get(f.sensor) == f.word)
         assert f.begin == recording.time[began]
@@ -70,7 +70,7 @@ def test_it_is_what_the_compensator_says_live(model: ErrorModel, cuts: dict[str,
 def test_what_stands_in_is_given_where_the_sensor_is_not_believed(model: ErrorModel) -> None:
     recording = failing(t1_C=(4.0, 4.0))
     (log,) = find_faults(assessing.assess([model], [recording], starts=Start()), [recording])
-    place = log.watch.names.index("t1_C")
+    place = log.watch.failing.index("t1_C")
     bad = log.fault[:, place] != GOOD
     truth = failing().table["t1_C"].to_numpy()
     assert np.isfinite(log.stood_in[bad, place]).all()

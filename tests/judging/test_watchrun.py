@@ -61,12 +61,14 @@ def check(
         passed, faults = run_watch(watch, time, values, resting, zero)
     for row, now in enumerate(time.tolist()):
         state, believed = look(watch, state, now, values[row], resting=bool(resting[row]))
-        assert faults[row].tolist() == state.fault.tolist(), row
+        assert faults[row].tolist() == state.faults(watch).tolist(), row
         np.testing.assert_allclose(passed[row], believed, rtol=1e-12, atol=1e-12)
     if not np.isnan(state.time):  # what later decisions rest on
         (memory,) = memories
         for name in ("predicted", "usual", "memory", "traces"):
             np.testing.assert_allclose(memory.find("s", name), getattr(state, name), rtol=1e-10, atol=1e-10)
+        for name, kept in (("heat", "heat"), ("stored", "stored"), ("estimate", "estimate"), ("states", "estimated")):
+            np.testing.assert_allclose(memory.find("s", kept), getattr(state.heat, name), rtol=1e-9, atol=1e-10)
         cleared = memory.find("s", "cleared") != 0
         assert cleared.tolist() == np.isneginf(state.evidence).tolist()
         found = memory.find("s", "evidence")[~cleared]

@@ -66,7 +66,7 @@ def test_the_verdict_of_each_cycle_is_there(judged: Judged, page: str) -> None:
 def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) -> None:
     told = words(page)
     assert "small" not in told
-    assert "failing: 2 of 3 temperature sensors failed, 1 did not" in told
+    assert "failing: 2 of 4 sensors failed, 2 did not" in told
     stepped, missing = log.faults
     assert f"t1_C stepped {stepped.begin / 3600:.2f} h the end {stepped.beside:.2f}" in told
     assert f"t3_C missing {missing.begin / 3600:.2f} h the end –" in told
@@ -88,9 +88,9 @@ def test_the_timeline_is_coloured_where_a_sensor_is_not_believed(log: FaultLog, 
         for bar in bars
         for x, y in [np.asarray(bar.get_paths()[0].vertices).T]
     }
-    assert drawn == {(f.word, round(f.begin), round(f.end), log.watch.names.index(f.sensor)) for f in log.faults}
+    assert drawn == {(f.word, round(f.begin), round(f.end), log.watch.failing.index(f.sensor)) for f in log.faults}
     assert {t.get_text() for t in ax.texts} == {f"{f.word} {f.begin / 3600:.1f} h" for f in log.faults}
-    assert [t.get_text() for t in ax.get_yticklabels()] == list(log.watch.names)
+    assert [t.get_text() for t in ax.get_yticklabels()] == list(log.watch.failing)
     speed = np.asarray(figure.axes[0].lines[0].get_ydata())
     assert speed == pytest.approx(recording.table["spindle_rpm"].to_numpy())
 
@@ -124,10 +124,10 @@ def test_codes_of_a_dead_sensor_do_not_flatten_the_curves(judged: Judged) -> Non
 def test_without_a_failure_there_is_a_sentence() -> None:
     day = failing()
     judged = assessing.assess([watched_model()], [day], starts=Start())
-    none = "None of the 3 temperature sensors failed: t1_C, t2_C, t3_C."
+    none = "None of the 4 sensors failed: t1_C, t2_C, t3_C, spindle_rpm."
     assert faults.section(judged, [day]) == Section("Sensors", [none])
     page = assessed.render(judged, [day])
-    assert "None of the 3 temperature sensors failed" in page
+    assert "None of the 4 sensors failed" in page
     assert "fades" not in words(page)
     bare = replace(judged, models=(replace(watched_model(), watch=None),))
     (why,) = faults.section(bare, [day]).parts
@@ -166,8 +166,8 @@ def test_two_recordings_are_told_apart(recording: Recording) -> None:
     both = [recording, replace(day, table=table)]
     judged = assessing.assess([watched_model()], both, starts=Start())
     page = words(assessed.render(judged, both))
-    assert "failing: 2 of 3 temperature sensors failed" in page
-    assert "other: 1 of 3 temperature sensors failed" in page
+    assert "failing: 2 of 4 sensors failed" in page
+    assert "other: 1 of 4 sensors failed" in page
     assert "t2_C missing 5.00 h (2024-05-02 03:00) the end" in page
     clips = re.findall(r'<clipPath id="([^"]+)"', assessed.render(judged, both))
     assert len(clips) == len(set(clips))

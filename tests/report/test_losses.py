@@ -42,5 +42,5 @@ def test_a_spare_is_recommended_where_what_stands_in_is_dear_or_nothing_does(mod
 def test_no_spare_is_recommended_where_all_are_replaced_well(model: ErrorModel) -> None:
     said = lines(model, {"t1_C": 2.0, "t2_C": 1.0, "t3_C": 1.2, "spindle_rpm": 9.0})
     assert "without spindle_rpm the correction is held" in said
-    assert "at most 2.00 um with one temperature sensor lost and replaced by its prediction" in said
+    assert "at most 2.00 um with one sensor lost and replaced by its prediction" in said
     assert "is recommended" not in said

@@ -31,8 +31,9 @@ from thermocomp.runtime.program.tables import Tables, gather
 
 FloatArray = NDArray[np.float64]
 #: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults
-#: that the others do not: in the return of a sensor, in the rate of a fade, and in the exclusion of swaps
-SHORT, LONG = ((*range(1, 14), 34, 38, 42), 640), (range(1000, 1200), 5000)
+#: that the others do not: in the return of a sensor, in the rate of a fade, and in the exclusion of swaps; 27 and 31
+#: add speeds that are wrong or missing, and a swap
+SHORT, LONG = ((*range(1, 14), 27, 31, 34, 38, 42), 640), (range(1000, 1200), 5000)
 #: of an ordinary run in structured text
 IN_TEXT = (range(1, 6), 200)
 #: smallest difference that counts [um]
@@ -166,7 +167,7 @@ def test_a_replay_is_numpy_with_probings_and_bands(seed: int) -> None:
         seen, faults = run_watch(watch, time, table[:, places], stands)
         passed[:, places], failed = seen, faults != 0
         for k in np.flatnonzero(failed.any(axis=1)).tolist():
-            lost = [n for n, f in zip(watch.names, failed[k].tolist(), strict=True) if f and n in model.sensors]
+            lost = [n for n, f in zip(watch.failing, failed[k].tolist(), strict=True) if f and n in model.sensors]
             undriven[k] = bool(lost) and not model.may_lose(lost)
     values = passed[:, [names.index(i.name) for i in model.inputs]]
     found = batch.run(model, limits, time, values, resting=stands, undriven=undriven, probed=probed)

@@ -118,7 +118,7 @@ def names_in(name: str) -> set[tuple[str, str]]:
 
 
 def test_memory_is_laid_out_without_overlaps() -> None:
-    sizes = {"CHANNELS": 3, "RANGES": 2, "SENSORS": 2, "MODELS": 2}
+    sizes = {"CHANNELS": 3, "RANGES": 2, "SENSORS": 2, "FAILING": 2, "MODELS": 2}
     memory = FlatMemory(sizes, {"rate": 0.5, "channel": [1, 2], "leans_on": [[True, False], [False, True]]})
     assert memory.find("t", "rate") == 0.5
     assert memory.find("t", "leans_on").tolist() == [[1, 0], [0, 1]]

@@ -7,6 +7,7 @@ from typing import Any
 
 from thermocomp.core.bounds import GAP
 from thermocomp.core.contributions import gains
+from thermocomp.core.heatcheck import SpeedFault
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.thresholds import Threshold
@@ -53,6 +54,8 @@ class SensorExplanation:
         The correction continues with the predicted value; otherwise it is held, then fades.
     spare : str
         Reason why a spare sensor is recommended; empty if none is.
+    faults : tuple of SpeedFault
+        How soon wrong values of a supervised speed are found.
     """
 
     name: str
@@ -73,6 +76,7 @@ class SensorExplanation:
     lost: float | None
     runs_on: bool
     spare: str
+    faults: tuple[SpeedFault, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -227,7 +231,7 @@ def _sensor(model: ErrorModel, name: str, settled: float | None, bound: float | 
         high=own.high,
         settled=settled,
         bound=bound,
-        watched=seen is not None,
+        watched=watch is not None and name in watch.failing,
         jump=seen.jump if seen else None,
         off=seen.off if seen else None,
         moved=seen.moved if seen else None,
@@ -236,8 +240,9 @@ def _sensor(model: ErrorModel, name: str, settled: float | None, bound: float | 
         unseen=seen.unseen if seen else None,
         undetected=abs(settled) * seen.off if seen and settled is not None else None,
         lost=found.lost.get(name) if found else None,
-        runs_on=seen is not None and model.may_lose([name]),
+        runs_on=watch is not None and name in watch.failing and model.may_lose([name]),
         spare=_spare(model, name, seen) if own.quantity == "temperature" else "",
+        faults=tuple(f for f in watch.speed_faults if watch.inputs[f.input].name == name) if watch else (),
     )
 
 
@@ -306,7 +311,8 @@ def _lines(e: Explanation) -> list[str]:
         lines.append(
             "A missing temperature is detected immediately; one that has jumped, drifted or is stuck is detected "
             f"{_span(lasting)} after it exceeds its limit. It is replaced by its prediction from the other "
-            "temperatures and the spindle speed. Limits and errors:"
+            "temperatures and the spindle speed, and a wrong speed by the one that explains the temperatures. Limits "
+            "and errors:"
         )
     else:
         lines.append(
@@ -328,7 +334,7 @@ def _lines(e: Explanation) -> list[str]:
 
 
 def _sensor_line(s: SensorExplanation, unit: str) -> str:
-    if s.quantity != "temperature":
+    if s.quantity != "temperature" and not s.watched:
         left = f" ({s.lost:.2f} {unit} if it read zero)" if s.lost is not None else ""
         return f"{s.name}: not monitored; without it the correction is held, then fades{left}"
     lost = f"error {s.lost:.2f} {unit} without it" if s.lost is not None else "never judged without it"
@@ -340,8 +346,21 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
             f"jump by more than {s.jump:.1f} degC in {_span(s.pace)}; drift by {s.off:.1f} degC{shift}; stuck while "
             f"its prediction changes by {s.moved:.1f} degC{still}"
         )
+    parts += [_fault_text(f) for f in s.faults]
     parts.append(lost if s.runs_on else f"{lost}; the correction is held, then fades")
     return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
+
+
+#: faults of a speed as text
+_SPEED_FAULTS = {"zero": "reads 0", "stuck": "stuck", "halved": "reads half", "beyond": "stuck far too high"}
+
+
+def _fault_text(fault: SpeedFault) -> str:
+    """Return how soon a fault of a speed is found, as text."""
+    if not fault.found:
+        return f"{_SPEED_FAULTS[fault.fault]}: not found"
+    cases = "" if fault.found > 0.995 else f" in {100 * fault.found:.0f} % of cases"
+    return f"{_SPEED_FAULTS[fault.fault]}: found within {fault.minutes:.0f} min of running{cases}"
 
 
 def _span(seconds: float) -> str:

@@ -28,6 +28,7 @@ def _fixed(value: float, unit: str, reason: str, source: str) -> float:
 
 
 _START, _WATCH, _PROBING, _OWN = "decision 0021", "decision 0030", "decision 0031", "choice of this project"
+_HEAT = "decision 0047"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +76,24 @@ class Thresholds:
     difference_time: float = _fixed(1800.0, "s", "time constant of the usual difference from the prediction", _WATCH)
     swap_evidence: float = _fixed(
         0.1, "", "a swap of two sensors is excluded once it has increased the mean square residual by this", _WATCH
+    )
+
+    least_share: float = _fixed(
+        0.02,
+        "",
+        "a spindle that turns slower than this share of its top speed counts as stopped, also one in 1/s",
+        _HEAT,
+    )
+    more_heat: float = _fixed(
+        0.4, "", "cutting heats the spindle up to 30 % more than turning in air; the speed is not wrong then", _HEAT
+    )
+    more_stored: float = _fixed(0.25, "", "the same for heat that is left in the spindle", _HEAT)
+    heat_stored: float = _fixed(1800.0, "s", "time constant with which heat of cutting leaves the spindle", _HEAT)
+    untrained_heat: float = _fixed(
+        0.5, "", "share of the heat above that at the trained top speed by which the estimate may be wrong", _HEAT
+    )
+    speed_doubt: float = _fixed(
+        1800.0, "s", "while a speed is in doubt for less than this, no temperature is excluded in its place", _HEAT
     )
 
     # adaptation by probings

@@ -19,6 +19,7 @@ from thermocomp.core.bounds import (
     check_finite,
 )
 from thermocomp.core.exceptions import SettingError
+from thermocomp.core.heatcheck import HeatCheck, HeatConstants, SpeedFault
 from thermocomp.core.inputs import Input
 from thermocomp.core.pacedbank import Bank
 from thermocomp.core.thresholds import THRESHOLDS, Thresholds
@@ -80,6 +81,10 @@ class Watch:
         One per temperature, in the order of the inputs.
     pace : float
         Time within which a change counts as a jump [s].
+    checks : tuple of HeatCheck
+        Supervision of the speeds; the last check of a speed determines its substitute. A speed without one is trusted.
+    speed_faults : tuple of SpeedFault
+        How soon the faults of each supervised speed are found.
     thresholds : Thresholds
         Those of the models that the watch belongs to.
 
@@ -96,6 +101,8 @@ class Watch:
     states: tuple[tuple[int, float, float, float], ...] = ()
     sensors: tuple[Watched, ...] = ()
     pace: float = 60.0
+    checks: tuple[HeatCheck, ...] = ()
+    speed_faults: tuple[SpeedFault, ...] = ()
     thresholds: Thresholds = THRESHOLDS
 
     def __post_init__(self) -> None:
@@ -134,11 +141,42 @@ class Watch:
             check_between("watch", LEAST, READING, **{name: [getattr(s, name) for s in self.sensors]})
         check_between("watch", 0.0, READING, unseen=[s.unseen for s in self.sensors])
         check_between("watch", LEAST, GAP, still=[s.still for s in self.sensors])
+        self._check_speeds(lagged)
+
+    def _check_speeds(self, lagged: int) -> None:
+        """Raise `SettingError` unless the checks of the speeds fit the inputs and are within their bounds."""
+        check_count("watch", INPUTS, checks=self.checks, speed_faults=self.speed_faults)
+        for k in (*(c.input for c in self.checks), *(f.input for f in self.speed_faults)):
+            if not 0 <= k < len(self.inputs) or self.inputs[k].quantity != "spindle_speed":
+                raise SettingError(f"watch: check of input {k}: it is not a spindle speed")
+        for c in self.checks:
+            if len(c.weights) != lagged:
+                raise SettingError(
+                    f"watch: check of {self.inputs[c.input].name} has {len(c.weights)} weights; expected {lagged}: one "
+                    "for each temperature and each of its lags"
+                )
+            check_finite("watch", weights=c.weights)
+        check_between("watch", LEAST, DEGREE, power=[c.power for c in self.checks])
+        check_between("watch", LEAST, GAP, lag=[c.lag for c in self.checks])
+        for name in ("off", "unseen"):
+            check_between("watch", LEAST, READING, **{name: [getattr(c, name) for c in self.checks]})
+        check_between("watch", 0.0, 1.0, found=[f.found for f in self.speed_faults])
+        check_between("watch", 0.0, GAP, minutes=[f.minutes for f in self.speed_faults])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the monitored temperatures."""
         return tuple(self.inputs[s.input].name for s in self.sensors)
+
+    @cached_property
+    def supervised(self) -> IntArray:
+        """Indices of the inputs that can fail: the temperatures, then the supervised speeds."""
+        return np.append(self.bank.temperatures, self.speeds[self.deciding >= 0])
+
+    @cached_property
+    def failing(self) -> tuple[str, ...]:
+        """Names of the inputs that can fail: the temperatures, then the supervised speeds."""
+        return tuple(self.inputs[k].name for k in self.supervised)
 
     @cached_property
     def bank(self) -> Bank:
@@ -162,12 +200,51 @@ class Watch:
         return table[: len(self.sensors)], table[len(self.sensors) :]
 
     @cached_property
-    def signatures(self) -> FloatArray:
-        """Effect of one degree in one sensor on all residuals, immediate and steady-state, (2, n, n), by row."""
+    def heat_read_out(self) -> tuple[FloatArray, FloatArray]:
+        """Readout coefficients of the heats: of temperatures, and of their lags, (..., n_checks) each."""
         n = len(self.sensors)
-        direct, states = self.read_out
-        lagged = states[: n * len(self.time_constants)].reshape(-1, n, n).sum(axis=0)
-        return np.stack([np.eye(n) - direct, np.eye(n) - direct - lagged])
+        table = np.array([c.weights for c in self.checks], dtype=np.float64)
+        table = table.reshape(len(self.checks), n * (1 + len(self.time_constants))).T
+        return table[:n], table[n:]
+
+    @cached_property
+    def heat_reach(self) -> FloatArray:
+        """Error of each estimate of a heat if a substitute is wrong by its limit, (n_sensors, n_checks)."""
+        direct, lagged = self.heat_read_out
+        settled = direct + lagged.reshape(len(self.time_constants), *direct.shape).sum(axis=0)
+        return np.maximum(np.abs(direct), np.abs(settled)) * self.limits("off")[:, None]
+
+    @cached_property
+    def heat_constants(self) -> HeatConstants:
+        """Numbers of the checks."""
+        return HeatConstants.of(self.checks, self.speeds.tolist())
+
+    @cached_property
+    def deciding(self) -> IntArray:
+        """Check that determines the substitute of each speed, (n_speeds,); -1: the speed is not supervised."""
+        of = [c.input for c in self.checks]
+        return np.array([max((k for k, i in enumerate(of) if i == s), default=-1) for s in self.speeds], dtype=np.intp)
+
+    @cached_property
+    def state_speeds(self) -> IntArray:
+        """Index of the speed among the speeds, of each speed state, (n_states,)."""
+        return np.searchsorted(self.speeds, self.bank.speeds)
+
+    @cached_property
+    def signatures(self) -> FloatArray:
+        """Effect of one degree in each sensor on all residuals, immediate and steady-state.
+
+        Returns
+        -------
+        ndarray of shape (2, n_sensors + n_checks, n_sensors)
+            Residuals of the temperatures, then of the heats, by row; the sensor by column.
+        """
+        n, lags = len(self.sensors), len(self.sensors) * len(self.time_constants)
+        direct = np.hstack([self.read_out[0], self.heat_read_out[0]])
+        lagged = np.hstack([self.read_out[1][:lags], self.heat_read_out[1]])
+        lagged = lagged.reshape(len(self.time_constants), n, n + len(self.checks))
+        immediate = np.eye(n + len(self.checks), n) - direct.T
+        return np.stack([immediate, immediate - lagged.sum(axis=0).T])
 
     @cached_property
     def pairs(self) -> tuple[IntArray, IntArray]:

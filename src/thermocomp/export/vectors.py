@@ -129,9 +129,9 @@ def find_tolerance(models: Sequence[ErrorModel]) -> float:
 def make_readings(tables: Tables) -> Readings:
     """Return readings that exercise all functions of a compensator.
 
-    A start at rest and a warm-up at changing speeds; each value missing, erratic or impossible for a while; late, old
-    or out-of-order readings; a source that stops until the corrections have faded to zero, and its return; sensors that
-    stick, step and drift one after the other; values beyond the trained range.
+    A start at rest, with two impossible speeds, and a warm-up at changing speeds; each value missing, erratic or
+    impossible for a while; late, old or out-of-order readings; a source that stops until the corrections have faded to
+    zero, and its return; sensors that stick, step and drift one after the other; values beyond the trained range.
     """
     machine, back = Warming(tables), tables.models[0].thresholds.return_time
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
@@ -142,8 +142,9 @@ def make_readings(tables: Tables) -> Readings:
         noise = np.where(machine.heat, 0.002 * rng.standard_normal(len(values)), 0.0)
         rows.append((np.round(values + noise, 4), old, dt))
 
-    for _ in range(45):
-        add(machine.run(0.0, 10.0), 10.0, 0.5)
+    for k in range(45):
+        rest = machine.run(0.0, 10.0)
+        add(np.where(machine.heat | (k not in (5, 6)), rest, 1e9), 10.0, 0.5)
     for k in range(120):
         dt = 60.0 if k % 3 else 12.0
         add(machine.run(_share(k), dt), dt, 0.25)
@@ -196,7 +197,8 @@ def _fail(tables: Tables, machine: Warming, add: Callable[[FloatArray, float], N
     sensors = np.array(tables.values["sensor_channel"] if tables.sensors else np.flatnonzero(machine.heat))
     if not len(sensors):
         return
-    may = np.all(tables.values["may_lose"], axis=0) if tables.sensors else np.zeros(len(sensors), np.bool_)
+    lost = np.all(tables.values["may_lose"], axis=0)[: len(sensors)]  # without the speeds
+    may = lost if tables.sensors else np.zeros(len(sensors), np.bool_)
     moves = (machine.high - machine.low)[sensors]
     stuck, stepped, drifting = (int(sensors[k]) for k in np.resize(np.lexsort((-moves, ~may)), 3))
     before = machine.run(0.0, 60.0)[stuck]

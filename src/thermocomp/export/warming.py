@@ -31,7 +31,7 @@ class Warming:
         self.high = np.array([i.reference + i.high for i in channels])
         self.heat = np.array([i.quantity == "temperature" for i in channels])
         self._now = self.rest.copy()
-        self._x = np.zeros(len(tables.sensors))
+        self._x = np.zeros(tables.sizes["SENSORS"])
         self._memory = np.zeros(tables.sizes.get("MEMORY", 0))
 
     def run(self, share: float, dt: float) -> FloatArray:

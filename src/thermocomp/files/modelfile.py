@@ -120,7 +120,7 @@ def watch_entry(watch: Watch) -> dict[str, Any]:
     """Return a watch as stored in a file."""
     entry = asdict(watch)
     del entry["thresholds"]  # stored once per file
-    return entry
+    return {k: v for k, v in entry.items() if v or k not in ("checks", "speed_faults")}
 
 
 def _check_judged(models: Sequence[ErrorModel], source: str) -> None:

@@ -109,7 +109,7 @@ def assess(
             samples, widening = believe(model, samples, every, watched)
             guard = _guard(model, samples, watched, guards)
             looked = model.watch is not None and can_look(model.watch, watched or samples)
-            names = model.watch.names if model.watch is not None and looked else ()
+            names = model.watch.failing if model.watch is not None and looked else ()
             overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]

@@ -124,10 +124,10 @@ def _logs(watch: Watch, judged: Judged, recordings: Sequence[Recording]) -> Iter
 
 
 def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> FaultLog:
-    heat = watch.bank.temperatures
+    heat = watch.supervised
     names = [c.name for c in samples.inputs]
     read = np.full((len(recording), len(heat)), np.nan)
-    for j, name in enumerate(watch.names):
+    for j, name in enumerate(watch.failing):
         if name in names:
             read[:, j] = samples.values[(samples.test == test) & (samples.row >= 0), names.index(name)]
     fault, stood_in = np.zeros(read.shape, np.int8), np.full(read.shape, np.nan)
@@ -145,7 +145,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             returned=b < len(recording) and fault[b, j] == GOOD,
             beside=float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
         )
-        for j, name in enumerate(watch.names)
+        for j, name in enumerate(watch.failing)
         for a, b in _runs(fault[:, j])
     ]
     ordered = tuple(sorted(found, key=lambda f: f.begin))
@@ -171,8 +171,8 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
 
 def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:
     """Return the failed sensors of a model in each row, in the order of its inputs."""
-    own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.names]
-    lost = log.fault[:, [log.watch.names.index(n) for n in own]] != GOOD
+    own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.failing]
+    lost = log.fault[:, [log.watch.failing.index(n) for n in own]] != GOOD
     cases, which = np.unique(lost, axis=0, return_inverse=True)
     named = [tuple(n for n, gone in zip(own, case, strict=True) if gone) for case in cases.tolist()]
     return [named[k] for k in which.ravel().tolist()]

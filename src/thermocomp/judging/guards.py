@@ -64,7 +64,7 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
         Judged rows: their tests are replayed up to the last of these rows.
     """
     together = combinations(watch.names, 2) if len(watch.names) <= FEW else ()
-    failing = [*((name,) for name in watch.names), *together]
+    failing = [*((name,) for name in watch.failing), *together]
     names = [c.name for c in samples.inputs]
     columns = [names.index(i.name) for i in watch.inputs]
     cut = np.array([[names[c] in lost for c in columns] for lost in failing])

@@ -44,7 +44,7 @@ def believe(
         values[mine[:, None], places] = passed[:, known]
         cases, which = np.unique(faults != 0, axis=0, return_inverse=True)
         for case, failed in enumerate(cases.tolist()):
-            lost = [n for n, f in zip(watch.names, failed, strict=True) if f and n in model.sensors]
+            lost = [n for n, f in zip(watch.failing, failed, strict=True) if f and n in model.sensors]
             if lost:
                 wider = model.widening(lost) if model.may_lose(lost) else np.inf
                 widening[mine[which == case]] = wider

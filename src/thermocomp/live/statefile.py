@@ -238,11 +238,22 @@ def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> Non
             # fields used in predictions are always numbers; instants may be unknown
             sure = name in ("reference", "memory", "traces", "used", "predicted", "usual", "bridge")
             _alike(value, getattr(first, name).shape, f"{place}.{name}", finite=sure and not np.isnan(seen.time))
-    instants = np.concatenate([np.ravel(getattr(seen, name)) for name in _INSTANTS])
+    for name, value in seen.heat._asdict().items():
+        sure = name not in ("since", "doubt", "gone", "back") and not np.isnan(seen.time)
+        _alike(value, getattr(first.heat, name).shape, f"{place}.heat.{name}", finite=sure)
+    times = [
+        *(getattr(seen, name) for name in _INSTANTS),
+        seen.heat.since,
+        seen.heat.doubt,
+        seen.heat.gone,
+        seen.heat.back,
+    ]
+    instants = np.concatenate([np.ravel(t) for t in times])
     known = instants[np.isfinite(instants)]
     want(not known.size or known.max() <= seen.time, None, place, "no instant later than its last update")
     want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"{place}.since", "the time of each failure")
-    want(bool(((seen.fault >= 0) & (seen.fault < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
+    faults = np.append(seen.fault, seen.heat.fault)
+    want(bool(((faults >= 0) & (faults < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
     _check_averaged(seen.averaged, n, f"{place}.averaged")
 
 

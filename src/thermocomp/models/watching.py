@@ -11,6 +11,7 @@ from thermocomp.core.bounds import GAP
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.watch import Watch, Watched
 from thermocomp.models.averaged import AveragedDynamic
+from thermocomp.models.heatchecks import find_checks
 from thermocomp.models.numerics.folds import number_folds
 from thermocomp.models.numerics.structures import fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
@@ -22,6 +23,8 @@ NOISE = 0.2
 STRUCTURES = 100
 #: limits are this many times the largest value observed in sound data, and larger with few cycles
 SAFETY = 1.5
+#: the same factor for heats, beside which more heat than that of the speed is allowed
+HEATED = 1.3
 #: the same factor for jumps: at a speed outside the training data, temperatures may rise faster
 FASTEST = 2.0
 #: lower bounds of the limits: deviation, change within a minute, movement while stuck, in addition to resolution [degC]
@@ -77,6 +80,8 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         limits = _limits(samples, change[:, k], predicted[:, place], folds, k, pace, wider)
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
         sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
+    wider *= HEATED / SAFETY
+    checks, faults = find_checks(of, change, step, folds, parts, known & (folds >= 0), wider)
     return Watch(
         inputs=inputs,
         zeroing=samples.zeroing,
@@ -85,6 +90,8 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         states=of.states,
         sensors=tuple(sensors),
         pace=pace,
+        checks=checks,
+        speed_faults=faults,
     )
 
 

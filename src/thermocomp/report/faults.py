@@ -43,8 +43,8 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
         )
         return Section(TITLE, [f"Temperature sensors were not monitored for faults: {why}."])
     if not any(log.faults for log in logs):
-        watched = list(dict.fromkeys(name for log in logs for name in log.watch.names))
-        return Section(TITLE, [f"None of the {len(watched)} temperature sensors failed: {', '.join(watched)}."])
+        watched = list(dict.fromkeys(name for log in logs for name in log.watch.failing))
+        return Section(TITLE, [f"None of the {len(watched)} sensors failed: {', '.join(watched)}."])
     parts: list[str | Layout | Shown] = [
         "The recordings were replayed as at the machine, where a fault takes effect until it is detected. Rows in "
         "which thermocomp check finds a fault are excluded from the verdict above, but not from this section."
@@ -100,7 +100,7 @@ def _held_words(target: str, unit: str, cost: Cost) -> str:
 
 def draw_timeline(log: FaultLog, recording: Recording) -> Drawn:
     """Plot when and why each sensor was rejected, with the spindle speed above."""
-    names, hours = log.watch.names, log.time / 3600
+    names, hours = log.watch.failing, log.time / 3600
     speed = recording.speed
     with drawing("timeline" + log.name):
         height = 0.26 * len(names)
@@ -153,7 +153,7 @@ def draw_stand_ins(log: FaultLog) -> Drawn:
         for ax in panels.flat[len(shown) :]:
             ax.set_visible(False)
         for ax, name in zip(panels.flat, shown, strict=False):
-            k = log.watch.names.index(name)
+            k = log.watch.failing.index(name)
             for f in (f for f in log.faults if f.sensor == name):
                 ax.axvspan(f.begin / 3600, f.end / 3600, color=SHADE, lw=0, zorder=0)
             ax.plot(hours, log.read[step, k], color=MEASURED, lw=1.4, label="reading")
@@ -180,11 +180,11 @@ def _around(read: FloatArray, stood_in: FloatArray) -> tuple[float, float]:
 
 
 def _timeline_words(log: FaultLog, logs: Sequence[FaultLog]) -> str:
-    good = len(log.watch.names) - len(log.failed)
+    good = len(log.watch.failing) - len(log.failed)
     others = [other.name for other in logs if not other.faults]
     more = f" No sensor failed in {', '.join(others)}." if others else ""
     return (
-        f"{log.name}: {len(log.failed)} of {len(log.watch.names)} temperature sensors failed, {good} did not. "
+        f"{log.name}: {len(log.failed)} of {len(log.watch.failing)} sensors failed, {good} did not. "
         f"Coloured: from the detection of a failure until the sensor is trusted again.{more}"
     )
 

@@ -1,4 +1,4 @@
-"""Capabilities of the temperature watch, and the loss of accuracy with a lost sensor, as text."""
+"""Capabilities of the watch, and the loss of accuracy with a lost sensor, as text."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,19 +15,18 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
     for model in models:
         found = model.honest_error
         single = {} if found is None else {n: v for n, v in found.lost.items() if ", " not in n}
-        stood = {n: v for n, v in single.items() if n in watch.names and model.may_lose([n])}
+        stood = {n: v for n, v in single.items() if n in watch.failing and model.may_lose([n])}
         if found is None or not single:
             continue
         said = []
         if stood:
             worst = max(stood, key=lambda n: stood[n])
             said.append(
-                f"at most {stood[worst]:.2f} {model.unit} with one temperature sensor lost and replaced by its "
-                f"prediction ({worst})"
+                f"at most {stood[worst]:.2f} {model.unit} with one sensor lost and replaced by its prediction ({worst})"
             )
         if gone := [n for n in single if n not in stood]:
             said.append(f"without {', '.join(gone)} the correction is held, then fades")
-        heat = [n for n in single if n in watch.names]
+        heat = [n for n in single if n in watch.failing]
         dear |= dict.fromkeys(n for n in heat if n not in stood or single[n] > DEAR * found.rms)
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
     if dear:

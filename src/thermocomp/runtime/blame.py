@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core import lagbank
 from thermocomp.core.watch import Watch
+from thermocomp.runtime.heat import HeatState, residuals
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -20,8 +21,21 @@ class Blamed(NamedTuple):
     worst: FloatArray  #: (...,), largest residual, relative to its limit
 
 
-def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
-    """Return the sensor whose failure, immediate or after the lags, leaves the smallest residuals.
+def find_limits(watch: Watch, memory: FloatArray) -> FloatArray:
+    """Return the largest permitted differences, (..., n_sensors): cutting may heat the spindle more than its speed.
+
+    Parameters
+    ----------
+    memory : ndarray of shape (..., n_memory)
+        See `thermocomp.runtime.watch.WatchState`.
+    """
+    lags = memory.shape[-1] - len(watch.states)
+    caused = np.abs(memory[..., lags:] @ watch.read_out[1][lags:])  # by the speed
+    return np.asarray(watch.limits("off") + watch.thresholds.more_heat * caused)
+
+
+def one_fails(watch: Watch, difference: FloatArray, able: BoolArray, heat: HeatState) -> Blamed:
+    """Return the sensor whose failure, immediate or after the lags, leaves the smallest residuals, those of heats too.
 
     Parameters
     ----------
@@ -30,14 +44,18 @@ def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
     able : ndarray of bool of shape (..., n_sensors)
         Sensors that may have failed.
     """
-    weights = watch.limits("unseen")
+    weights, most = watch.limits("unseen"), watch.limits("off")
+    if watch.checks:
+        weights = np.append(weights, watch.heat_constants.unseen)
+        most = np.append(most, watch.heat_constants.off)
+        difference = np.concatenate([difference, residuals(watch, heat)], axis=-1)
     scaled = difference / weights
     found = _nobody(able)
     for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
         amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
         left = np.swapaxes(scaled[..., :, None] - shape * amount[..., None, :], -1, -2) * weights
         rest = np.where(able, ((left / weights) ** 2).sum(axis=-1), np.inf)
-        one = _least(rest, np.abs(left / watch.limits("off")).max(axis=-1), np.eye(len(weights), dtype=np.bool_))
+        one = _least(rest, np.abs(left / most).max(axis=-1), np.eye(able.shape[-1], dtype=np.bool_))
         better = one.rest < found.rest
         found = Blamed(
             np.where(better[..., None], one.sensors, found.sensors),
@@ -45,6 +63,19 @@ def one_fails(watch: Watch, difference: FloatArray, able: BoolArray) -> Blamed:
             np.where(better, one.worst, found.worst),
         )
     return found
+
+
+def speeds_fail(watch: Watch, x: FloatArray, memory: FloatArray, able: BoolArray, heat: HeatState) -> FloatArray:
+    """Return the sum of squared residuals if the supervised speeds are wrong, (...,): they have no free parameter.
+
+    Parameters are those of `weigh_swaps`.
+    """
+    if not watch.checks:
+        return np.full(able.shape[:-1], np.inf)
+    direct, weights = watch.read_out
+    lags = memory.shape[-1] - len(watch.states)
+    predicted = x @ direct + memory[..., :lags] @ weights[:lags] + heat.states @ weights[lags:]
+    return np.asarray((np.where(able, (x - predicted) / watch.limits("unseen"), 0.0) ** 2).sum(axis=-1))
 
 
 def weigh_swaps(

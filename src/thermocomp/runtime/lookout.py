@@ -34,7 +34,7 @@ class Lookout:
         zeroing, watch = self.watch.zeroing, self.watch
         resting = zeroing.stands(values.get(zeroing.speed), watch.thresholds.stopped_speed)
         state, believed = look(watch, state, time, numbers, resting=resting)
-        return state, {**values, **dict(zip(watch.names, believed[watch.bank.temperatures].tolist(), strict=True))}
+        return state, {**values, **dict(zip(watch.failing, believed[watch.supervised].tolist(), strict=True))}
 
     @staticmethod
     def failed(lookouts: Sequence["Lookout"], states: Sequence[WatchState]) -> dict[str, str]:
@@ -42,7 +42,7 @@ class Lookout:
         return {
             name: WORDS[fault]
             for lookout, state in zip(lookouts, states, strict=True)
-            if np.count_nonzero(state.fault)
-            for name, fault in zip(lookout.watch.names, state.fault.tolist(), strict=True)
+            if np.count_nonzero(faults := state.faults(lookout.watch))
+            for name, fault in zip(lookout.watch.failing, faults.tolist(), strict=True)
             if fault
         }

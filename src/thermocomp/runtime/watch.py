@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from thermocomp.core import lagbank
 from thermocomp.core.watch import Watch
 from thermocomp.core.zero import ZeroMean
-from thermocomp.runtime.blame import one_fails, weigh_swaps
+from thermocomp.runtime import heat
+from thermocomp.runtime.blame import find_limits, one_fails, speeds_fail, weigh_swaps
+from thermocomp.runtime.heat import HeatState
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -49,6 +51,15 @@ class WatchState(NamedTuple):
     back: FloatArray  #: time since which a missing sensor agrees with its prediction; nan: it does not [s]
     evidence: FloatArray  #: (..., n_pairs), low-passed evidence that two are swapped; -inf: excluded
     fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
+    heat: HeatState = HeatState()  #: supervision of the speeds
+
+    def faults(self, watch: Watch) -> IntArray:
+        """Return the faults of the inputs that can fail, (..., n_failing): temperatures, then supervised speeds."""
+        return (
+            np.concatenate([self.fault, self.heat.fault[..., watch.deciding >= 0]], axis=-1)
+            if watch.checks
+            else self.fault
+        )
 
 
 def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ...] = ()) -> WatchState:
@@ -86,13 +97,15 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
         back=nan,
         evidence=np.zeros((*runs, len(watch.pairs[0]))),
         fast=np.full(runs, -np.inf),
+        heat=heat.begin(watch, runs) if watch.checks else HeatState(),
     )
 
 
 def is_quiet(watch: Watch, state: WatchState, time: float) -> bool:
     """Return whether all sensors are good and no check is due; a plausible reading is then used unchanged."""
     due = not time - state.time < watch.thresholds.check_interval  # also if the time is unknown
-    return not (due or np.count_nonzero(state.fault) or np.count_nonzero(state.jumped == state.jumped))
+    failed = np.count_nonzero(state.fault) or np.count_nonzero(state.heat.fault)
+    return not (due or failed or np.count_nonzero(state.jumped == state.jumped))
 
 
 def look(
@@ -113,23 +126,35 @@ def look(
     values : ndarray of shape (..., n_inputs)
         Values with substitutes for temperatures that are not trusted.
     """
-    heat = watch.bank.temperatures
+    temperatures, speeds = watch.bank.temperatures, values.take(watch.speeds, axis=-1)
     believed = values.copy()
-    fastest = watch.thresholds.most_speed  # an impossible speed must not enter the memory
-    if not (np.abs(values.take(watch.speeds, axis=-1)) <= fastest).all():
+    lost = ~(np.abs(speeds) <= watch.thresholds.most_speed)  # an impossible speed must not enter the memory
+    if (lost & ((watch.deciding < 0) | np.isnan(state.time))).any():
         return state, believed
     if np.isnan(state.time):
-        believed[..., heat] = _made_up(watch, values[..., heat])
+        believed[..., temperatures] = _made_up(watch, values[..., temperatures])
         return _start(watch, state, time, believed, resting), believed
-    zero = state.reference.take(heat, axis=-1)
-    read = values.take(heat, axis=-1)
+    zero = state.reference.take(temperatures, axis=-1)
+    read = values.take(temperatures, axis=-1)
     x = read - zero
     missing = ~_plausible(watch, x, read)
+    if (lost.any(axis=-1) & missing.all(axis=-1)).any():
+        return state, believed  # there is no reading at all
+    believed[..., watch.speeds] = _trusted(watch, state, speeds, lost)
     if time - state.time >= watch.thresholds.check_interval:
-        state = _step(watch, state, time, np.where(missing, np.nan, x), values)
+        known = np.where(lost, np.nan, speeds)
+        state = _step(watch, state, time, np.where(missing, np.nan, x), believed, known)
+        believed[..., watch.speeds] = _trusted(watch, state, speeds, lost)
     if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
-        believed[..., heat] = np.where(replaced, zero + state.used, read)
+        believed[..., temperatures] = np.where(replaced, zero + state.used, read)
     return state, believed
+
+
+def _trusted(watch: Watch, state: WatchState, speeds: FloatArray, lost: BoolArray) -> FloatArray:
+    """Return the speeds, (..., n_speeds), with substitutes for those that are not trusted."""
+    if not watch.checks or not (replaced := lost | (state.heat.fault != GOOD)).any():
+        return speeds
+    return np.where(replaced, heat.find_speeds(watch, state.heat, speeds), speeds)
 
 
 def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
@@ -152,7 +177,7 @@ def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
     """Add a reading to the zero if unknown; then start at rest in the zero, or else in the first reading."""
-    averaged, heat = state.averaged, watch.bank.temperatures
+    averaged = state.averaged
     unknown = bool(np.isnan(state.reference).any())
     if unknown and averaged.belongs(watch.zeroing, time, resting):
         averaged = averaged.add(time, values, resting)
@@ -163,8 +188,10 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
         begun = averaged.mean
         zero = np.where(np.isnan(zero), begun, zero)
     change = begun - zero
-    memory, used = watch.bank.signals(_calmed(watch, change))[0], change[..., heat]
+    memory, used = watch.bank.signals(_calmed(watch, change))[0], change[..., watch.bank.temperatures]
     direct, weights = watch.read_out
+    if watch.checks:
+        state = state._replace(heat=heat.start(watch, state.heat, memory, begun[..., watch.speeds]))
     return state._replace(
         reference=zero,
         averaged=ZeroMean(),
@@ -191,8 +218,10 @@ def _stand_in(watch: Watch, state: WatchState, time: float) -> FloatArray:
     return state.predicted + state.bridge * np.exp(-gone / watch.thresholds.substitute_fade)
 
 
-def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray) -> WatchState:
-    """Check all sensors and return the next state; `x` is nan where a temperature is missing."""
+def _step(
+    watch: Watch, state: WatchState, time: float, x: FloatArray, values: FloatArray, speeds: FloatArray
+) -> WatchState:
+    """Check all sensors and return the next state; `x` and `speeds` (as read) are nan where a value is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
     s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
@@ -219,9 +248,22 @@ def _step(watch: Watch, state: WatchState, time: float, x: FloatArray, values: F
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
     s, stuck = _stuck(watch, s, x, calm)
+    s, wrong = _check_speeds(watch, s, speeds, dt)
     s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
-    s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting))
+    s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting, wrong))
     return _returns(watch, s, difference)
+
+
+def _check_speeds(watch: Watch, s: WatchState, speeds: FloatArray, dt: float) -> tuple[WatchState, BoolArray]:
+    """Compare the heats of the speeds with their estimates; return the speeds that have been wrong for too long."""
+    if not watch.checks:
+        return s, np.zeros(speeds.shape, dtype=np.bool_)
+    lost, lags = np.isnan(speeds), s.memory.shape[-1] - len(watch.states)
+    found = heat.advance(
+        watch, heat.lose(s.heat, s.time, lost), speeds, s.used, s.memory[..., :lags], s.fault != GOOD, dt
+    )
+    found, wrong = heat.find_lasting(watch, found, s.time)
+    return s._replace(heat=heat.trust_again(watch, found, s.time, lost)), wrong
 
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
@@ -284,12 +326,12 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find the runs, (...,), in which a difference has been too large for too long."""
-    z = np.where(calm, difference, 0.0) / watch.limits("off")
+    z = np.where(calm, difference, 0.0) / find_limits(watch, s.memory)
     if not (np.abs(z) > 1.0).any():
         return s._replace(off=np.full(z.shape, np.nan)), np.zeros(z.shape[:-1], dtype=np.bool_)
-    recent = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf, keepdims=True)
-    rest = watch.thresholds.fault_rest
-    beyond = (np.abs(z) > 1.0) & (s.time - recent > rest) & (s.time - s.fast[..., None] > rest)
+    failed = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf)
+    recent = np.maximum(failed, s.fast)[..., None]
+    beyond = (np.abs(z) > 1.0) & (s.time - recent > watch.thresholds.fault_rest)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
     with np.errstate(invalid="ignore"):
         return s._replace(off=off), np.asarray((s.time - off >= watch.thresholds.fault_duration).any(axis=-1))
@@ -301,32 +343,51 @@ def _blame(
     x: FloatArray,
     able: BoolArray,
     dt: float,
-    found: tuple[BoolArray, BoolArray, BoolArray],
+    found: tuple[BoolArray, BoolArray, BoolArray, BoolArray],
 ) -> WatchState:
-    """Exclude failed sensors: a swapped pair if it explains all residuals better than one failure; else single ones."""
-    stepped, stuck, lasting = found
+    """Exclude failed sensors: a swapped pair or a speed if it explains all residuals best; else single sensors."""
+    stepped, stuck, lasting, speeds = found
     counts = np.where(s.time - s.fast[..., None] > watch.thresholds.fault_rest, dt, 0.0)
-    wrong = lasting | (stepped | stuck).any(axis=-1)
+    wrong = lasting | (stepped | stuck).any(axis=-1) | speeds.any(axis=-1)
     evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts, find=bool(wrong.any()))
     s = s._replace(evidence=evidence)
     if not wrong.any():
         return s
     direct, states = watch.read_out
-    one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able)
-    swapped = wrong & (both.worst <= 1.0) & (both.rest < one.rest)
+    one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able, s.heat)
+    rest = np.minimum(one.rest, speeds_fail(watch, x, s.memory, able, s.heat))
+    doubt = heat.in_doubt(watch, s.heat, s.time) & ~speeds.any(axis=-1)  # then no temperature is excluded
+    pair = (both.worst <= 1.0) & (both.rest < rest)
+    swapped = (lasting | (stepped | stuck).any(axis=-1)) & ~doubt & pair
     s = _fail(watch, s, swapped[..., None] & both.sensors, SWAPPED, np.zeros(x.shape))
     for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
         s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
     calm = able & np.isnan(s.jumped)
-    one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm)
+    one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm, s.heat)
+    slow = speeds_fail(watch, x, s.memory, calm, s.heat) < one.rest  # speeds explain the residuals better
+    alone = ~swapped & ~(stepped | stuck).any(axis=-1)
+    s = _fail_speeds(watch, s, speeds & (alone & slow & ~pair)[..., None])
     # otherwise no single failure explains the residuals: the machine is unlike its training
-    sure = lasting & ~swapped & ~(stepped | stuck).any(axis=-1) & (one.worst <= 1.0)
+    sure = lasting & alone & ~slow & ~doubt & (one.worst <= 1.0)
     return _fail(watch, s, sure[..., None] & one.sensors, OFF, np.zeros(x.shape))
 
 
+def _fail_speeds(watch: Watch, s: WatchState, found: BoolArray) -> WatchState:
+    """Exclude speeds; their states become those of the speeds that explain the temperatures."""
+    if not found.any():
+        return s
+    memory, lags = s.memory.copy(), s.memory.shape[-1] - len(watch.states)
+    memory[..., lags:] = np.where(found.take(watch.state_speeds, axis=-1), s.heat.states, memory[..., lags:])
+    fault = np.where(found, OFF, s.heat.fault).astype(np.int8)
+    off = np.where(found.any(axis=-1, keepdims=True), np.nan, s.off)
+    return s._replace(memory=memory, heat=s.heat._replace(fault=fault), off=off)
+
+
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
-    """Return the last time at which the spindle exceeded the trained speeds, where predictions are not validated."""
+    """Return the last time at which predictions were not validated: untrained speeds, or substitutes for speeds."""
     faster = (np.abs(change[..., watch.speeds]) > watch.thresholds.fast_factor * watch.top_speed).any(axis=-1)
+    if watch.checks:
+        faster |= (s.heat.fault != GOOD).any(axis=-1)
     return np.where(faster, s.time, s.fast)
 
 

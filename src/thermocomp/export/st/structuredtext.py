@@ -30,7 +30,7 @@ OUTPUTS: dict[str, str] = {
     "correction": "TARGETS",
     "slope": "TARGETS",
     "status": "TARGETS",
-    "fault": "SENSORS",
+    "fault": "FAILING",
     "rejected": "",
     "outside": "",
 }

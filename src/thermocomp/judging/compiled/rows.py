@@ -7,7 +7,7 @@ from thermocomp.runtime.program.watching import believe
 
 @procedure
 def believe_rows(s: Kept, w: Work, t: Constants, r: TestRows) -> None:
-    """Replace temperatures that are not trusted, reading by reading."""
+    """Replace temperatures and speeds that are not trusted, reading by reading."""
     for row in each("row", t.ROWS):
         w.now = r.time[row]
         w.stands = r.resting[row]
@@ -17,7 +17,7 @@ def believe_rows(s: Kept, w: Work, t: Constants, r: TestRows) -> None:
         believe(s, w, t)
         for c in each("c", t.CHANNELS):
             r.value[row, c] = w.value[c]
-        for i in each("i", t.SENSORS):
+        for i in each("i", t.FAILING):
             r.fault[row, i] = s.fault[i]
 
 

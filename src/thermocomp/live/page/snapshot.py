@@ -34,7 +34,7 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
     """
     said, now, tick = service.said, service.clock.now(), service.clock.tick()
     failed = said.failed if said else {}
-    watched = {name for watch in service.compensator.watches for name in watch.names}
+    watched = {name for watch in service.compensator.watches for name in watch.failing}
 
     def word(name: str, age: float) -> str:
         if age > service.compensator.limits.reading_age:

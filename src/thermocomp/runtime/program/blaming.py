@@ -1,5 +1,6 @@
 """Sensor failure that explains the residuals of readings, with scalars and loops: see `thermocomp.runtime.blame`."""
 
+from thermocomp.runtime.program import heating
 from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, flag, real
@@ -19,9 +20,19 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     for i in each("i", t.SENSORS):
         with when(w.stepped[i] | w.stuck[i]):
             alone.set(True)
-    with when(w.lasting | alone):
+    slow = let("slow", flag(False))
+    with when(t.supervised):
+        for k in each("k", t.SPEEDS):
+            slow.set(slow | w.wrong[k])
+        w.doubt = w.doubt & ~slow
+    with when(w.lasting | alone | slow):
         find_one(s, w, t)
-        swapped = let("swapped", (w.both >= 0) & (w.both_worst <= 1.0) & ((w.one < 0) | (w.both_rest < w.one_rest)))
+        pair = let("pair", (w.both >= 0) & (w.both_worst <= 1.0) & ((w.one < 0) | (w.both_rest < w.one_rest)))
+        swapped = let("swapped", pair)
+        with when(t.supervised):
+            heating.weigh_speeds(s, w, t)
+            pair.set(pair & (w.both_rest < w.speeds_rest))
+            swapped.set(pair & ~w.doubt & (w.lasting | alone))
         with when(swapped):
             for i in each("i", t.SENSORS):
                 w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
@@ -42,8 +53,15 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             w.able[i] = w.able[i] & ~s.has_jumped[i]
             w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
         weigh_one(s, w, t)
+        sure = let("sure", w.lasting & ~swapped & ~alone)
+        with when(t.supervised):
+            heating.weigh_speeds(s, w, t)
+            slow.set((w.one < 0) | (w.speeds_rest < w.one_rest))
+            sure.set(sure & ~slow & ~w.doubt)
+            with when(slow & ~pair & ~swapped & ~alone):
+                heating.fail_speeds(s, w, t)
         # otherwise no single failure explains the difference: the machine behaves differently from its training
-        with when(w.lasting & ~swapped & ~alone & (w.one >= 0) & (w.one_worst <= 1.0)):
+        with when(sure & (w.one >= 0) & (w.one_worst <= 1.0)):
             for i in each("i", t.SENSORS):
                 w.failing[i] = i.equals(w.one)
                 w.onset[i] = 0.0
@@ -78,18 +96,21 @@ def weigh_one(s: Kept, w: Work, t: Constants) -> None:
     w.one = -1
     w.one_rest = 0.0
     w.one_worst = 0.0
+    for c in each("c", t.CHECKS):
+        trusted = s.fault[t.speed_fault[t.check_speed[c]]].equals(GOOD)
+        w.weighed[t.SENSORS + c] = choose(trusted, s.heat[c] - s.estimate[c], 0.0)
     for h in each("h", t.SHAPES):
         for j in each("j", t.SENSORS):
             with when(w.able[j]):
                 amount = let("amount", real(0.0))
                 square = let("square", real(0.0))
-                for i in each("i", t.SENSORS):
+                for i in each("i", t.RESIDUALS):
                     amount.set(amount + w.weighed[i] / t.unseen[i] * t.shape[h, i, j])
                     square.set(square + t.shape[h, i, j] * t.shape[h, i, j])
                 amount.set(amount / square)
                 rest = let("rest", real(0.0))
                 worst = let("worst", real(0.0))
-                for i in each("i", t.SENSORS):
+                for i in each("i", t.RESIDUALS):
                     left = let("left", w.weighed[i] / t.unseen[i] - t.shape[h, i, j] * amount)
                     rest.set(rest + left * left)
                     worst.set(larger(worst, abs(left * t.unseen[i] / t.off_limit[i])))

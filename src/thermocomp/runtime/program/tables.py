@@ -34,6 +34,12 @@ OF_WATCH = (
     "fast_factor",
     "difference_time",
     "swap_evidence",
+    "least_share",
+    "more_heat",
+    "more_stored",
+    "heat_stored",
+    "untrained_heat",
+    "speed_doubt",
 )
 
 
@@ -42,7 +48,7 @@ class Tables(NamedTuple):
 
     channels: tuple[Input, ...]  #: in the order of the block's input values
     ranges: tuple[Input, ...]  #: inputs of the models, without duplicates
-    sensors: tuple[str, ...]  #: monitored temperatures
+    sensors: tuple[str, ...]  #: monitored temperatures, then supervised speeds
     targets: tuple[str, ...]
     models: tuple[ErrorModel, ...]
     sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
@@ -78,7 +84,7 @@ def gather(compensator: Compensator) -> Tables:
     channels = _channels([*ranges, *(watch.inputs if watch else ())], zeroing.speed)
     place = {c.name: k for k, c in enumerate(channels)}
     sets = list(dict.fromkeys(m.inputs for m in models))
-    sensors = watch.names if watch else ()
+    sensors = watch.failing if watch else ()
     limits, lines, thresholds = compensator.limits, compensator.lines, compensator.thresholds
     values: dict[str, Any] = {
         **{name: getattr(limits, name) for name in ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")},
@@ -219,10 +225,11 @@ def _judged(models: tuple[ErrorModel, ...], sensors: tuple[str, ...]) -> dict[st
 
 def _watch_sizes(watch: Watch | None) -> dict[str, int]:
     if watch is None:
-        return {"watched": 0, "SENSORS": 0}
+        return {"watched": 0, "supervised": 0, "SENSORS": 0, "FAILING": 0}
     n, bank = len(watch.sensors), watch.bank
     return {
         "watched": 1,
+        "supervised": int(bool(watch.checks)),
         "SENSORS": n,
         "WATCHED": len(watch.inputs),
         "SPEEDS": len(watch.speeds),
@@ -232,6 +239,9 @@ def _watch_sizes(watch: Watch | None) -> dict[str, int]:
         "MEMORY": len(bank.rates),
         "PAIRS": len(watch.pairs[0]),
         "SHAPES": 2,
+        "CHECKS": len(watch.checks),
+        "RESIDUALS": n + len(watch.checks),
+        "FAILING": len(watch.failing),
         "watch_waits": int(any(i.rezero for i in watch.inputs)),
     }
 
@@ -264,7 +274,9 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
     lags = bank.taus * len(heat)
     low, high, width = (a.tolist() for a in watch.ranges)
     direct, weight = watch.read_out
-    unseen = watch.limits("unseen")
+    heats = watch.heat_constants
+    unseen = np.append(watch.limits("unseen"), heats.unseen)
+    failing = watch.supervised.tolist()
     return {
         "sensor_channel": [place[i.name] for i in heat],
         "sensor_input": [s.input for s in watch.sensors],
@@ -287,9 +299,20 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "gain": bank.gain.tolist(),
         "direct": direct.tolist(),
         "weight": weight.tolist(),
-        **{f"{name}_limit": watch.limits(name).tolist() for name in ("off", "jump", "moved", "still")},
+        **{f"{name}_limit": watch.limits(name).tolist() for name in ("jump", "moved", "still")},
+        "off_limit": [*watch.limits("off").tolist(), *heats.off.tolist()],
         "unseen": unseen.tolist(),
         "shape": (watch.signatures / unseen[:, None]).tolist(),
         "pair_first": watch.pairs[0].tolist(),
         "pair_second": watch.pairs[1].tolist(),
+        "deciding": watch.deciding.tolist(),
+        "speed_fault": [failing.index(k) if k in failing else 0 for k in watch.speeds.tolist()],
+        "state_speed": watch.state_speeds.tolist(),
+        "check_speed": heats.speeds.tolist(),
+        "heat_power": heats.powers.tolist(),
+        "heat_root": (1.0 / heats.powers).tolist(),
+        "heat_lag": heats.lags.tolist(),
+        "heat_direct": watch.heat_read_out[0].tolist(),
+        "heat_weight": watch.heat_read_out[1].tolist(),
+        "heat_reach": watch.heat_reach.tolist(),
     }

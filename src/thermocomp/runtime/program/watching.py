@@ -1,6 +1,6 @@
 """Monitoring of the temperatures with scalars and loops only: see `thermocomp.runtime.watch` for explanations."""
 
-from thermocomp.runtime.program import blaming
+from thermocomp.runtime.program import blaming, heating
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.language import (
     choose,
@@ -14,7 +14,7 @@ from thermocomp.runtime.program.language import (
     when,
 )
 from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
-from thermocomp.runtime.program.values import Number, Whole, flag, integer
+from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import GOOD, MISSING
 
@@ -23,31 +23,54 @@ HOLDING = 2
 
 @procedure
 def believe(s: Kept, w: Work, t: Constants) -> None:
-    """Replace each temperature that is not trusted by its substitute."""
+    """Replace each temperature or speed that is not trusted by its substitute."""
     w.made = True
     for k in each("k", t.SPEEDS):
         c = let("c", t.watch_channel[t.speed_input[k]])
-        with when(~(w.given[c] & (abs(w.value[c]) <= t.most_speed))):
+        w.speed_lost[k] = ~(w.given[c] & (abs(w.value[c]) <= t.most_speed))
+        w.speed[k] = choose(w.speed_lost[k], 0.0, w.value[c])
+        with when(w.speed_lost[k] & ((t.deciding[k] < 0) | ~s.looked)):
             w.made = False
     with when(w.made & ~s.looked):
         make_up(s, w, t)
         begin(s, w, t)
     with otherwise_when(w.made):
-        for i in each("i", t.SENSORS):
-            c.set(t.sensor_channel[i])
-            w.there[i] = False
-            w.x[i] = 0.0
-            with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
-                w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[i]]
-                w.there[i] = (w.x[i] >= t.sensor_low[i] - t.sensor_span[i]) & (
-                    w.x[i] <= t.sensor_high[i] + t.sensor_span[i]
-                )
-        with when(w.now - s.look >= t.check_interval):
-            look(s, w, t)
-        for i in each("i", t.SENSORS):
-            with when(s.fault[i].differs(GOOD) | ~w.there[i] | s.has_jumped[i]):
-                w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + s.used[i]
-                w.given[t.sensor_channel[i]] = True
+        read_sensors(s, w, t)
+        with when(w.made):
+            pass_on(s, w, t)
+
+
+@procedure
+def read_sensors(s: Kept, w: Work, t: Constants) -> None:
+    """Read the temperatures; without any of them, and with a speed missing, there is no reading."""
+    some = let("some", flag(False))
+    for i in each("i", t.SENSORS):
+        c = let("c", t.sensor_channel[i])
+        w.there[i] = False
+        w.x[i] = 0.0
+        with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
+            w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[i]]
+            w.there[i] = (w.x[i] >= t.sensor_low[i] - t.sensor_span[i]) & (
+                w.x[i] <= t.sensor_high[i] + t.sensor_span[i]
+            )
+        some.set(some | w.there[i])
+    for k in each("k", t.SPEEDS):
+        w.made = w.made & (some | ~w.speed_lost[k])
+
+
+@procedure
+def pass_on(s: Kept, w: Work, t: Constants) -> None:
+    """Check the sensors, and replace those that are not trusted."""
+    with when(t.supervised):
+        heating.trust_speeds(s, w, t)
+    with when(w.now - s.look >= t.check_interval):
+        look(s, w, t)
+        with when(t.supervised):
+            heating.trust_speeds(s, w, t)
+    for i in each("i", t.SENSORS):
+        with when(s.fault[i].differs(GOOD) | ~w.there[i] | s.has_jumped[i]):
+            w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + s.used[i]
+            w.given[t.sensor_channel[i]] = True
 
 
 @procedure
@@ -92,6 +115,8 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
         for i in each("i", t.SENSORS):
             s.used[i] = w.change[t.sensor_input[i]]
             s.still[i] = w.now
+        for k in each("k", t.SPEEDS):
+            w.speed[k] = w.change[t.speed_input[k]] + s.watch_zero[t.speed_input[k]]
         calm_down(s, w, t)
         for k in each("k", t.TAUS):
             for i in each("i", t.SENSORS):
@@ -99,6 +124,8 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
         for k in each("k", t.STATES):
             s.memory[t.LAGGED + k] = raised(abs(w.change[t.state_input[k]]) / t.top_speed, t.power[k])
         predict(s, w, t)
+        with when(t.supervised):
+            heating.begin_heats(s, w, t)
         s.looked = True
         s.look = w.now
 
@@ -156,6 +183,9 @@ def look(s: Kept, w: Work, t: Constants) -> None:
             inner = let("inner", choose(w.calm[i], w.difference[i], 0.0))
             s.traces[k * t.SENSORS + i] = follow(s.traces[k * t.SENSORS + i], inner, elapsed / t.tau[k])
     find_stuck(s, w, t)
+    with when(t.supervised):
+        heating.check_speeds(s, w, t, elapsed)
+    find_fast(s, w, t)
     find_off(s, w, t)
     blaming.blame(s, w, t, elapsed)
     believe_again(s, w, t)
@@ -194,10 +224,6 @@ def advance(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         share = let("share", abs(w.change[t.state_input[k]]) / t.top_speed)
         quick = let("quick", t.resting_rate[k] + share * t.gain[k])
         s.memory[t.LAGGED + k] = follow(s.memory[t.LAGGED + k], raised(share, t.power[k]), elapsed * quick)
-    for k in each("k", t.SPEEDS):
-        with when(abs(w.change[t.speed_input[k]]) > t.fast_factor * t.top_speed):
-            s.was_fast = True
-            s.fast = w.now
 
 
 @procedure
@@ -225,6 +251,18 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
 
 
 @procedure
+def find_fast(s: Kept, w: Work, t: Constants) -> None:
+    """Find untrained speeds and substitutes for speeds: predictions are not validated with them."""
+    for k in each("k", t.SPEEDS):
+        fast = let("fast", abs(w.change[t.speed_input[k]]) > t.fast_factor * t.top_speed)
+        with when(t.deciding[k] >= 0), when(s.fault[t.speed_fault[k]].differs(GOOD)):
+            fast.set(True)
+        with when(fast):
+            s.was_fast = True
+            s.fast = w.now
+
+
+@procedure
 def find_off(s: Kept, w: Work, t: Constants) -> None:
     """Find sensors whose difference from the prediction has been too large for too long."""
     rested = let("rested", ~s.was_fast | (w.now - s.fast > t.fault_rest))
@@ -233,7 +271,11 @@ def find_off(s: Kept, w: Work, t: Constants) -> None:
             rested.set(False)
     w.lasting = False
     for i in each("i", t.SENSORS):
-        beyond = let("beyond", rested & w.calm[i] & (abs(w.difference[i] / t.off_limit[i]) > 1.0))
+        caused = let("caused", real(0.0))
+        for k in each("k", t.STATES):
+            caused.set(caused + s.memory[t.LAGGED + k] * t.weight[t.LAGGED + k, i])
+        most = let("most", t.off_limit[i] + t.more_heat * abs(caused))
+        beyond = let("beyond", rested & w.calm[i] & (abs(w.difference[i] / most) > 1.0))
         with when(beyond & ~s.is_off[i]):
             s.off_since[i] = w.now
         s.is_off[i] = beyond
@@ -263,7 +305,7 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     for m in each("m", t.line_begin[k], t.line_begin[k + 1]):
         lost = let("lost", integer(0))
         allowed = let("allowed", flag(True))
-        for i in each("i", t.SENSORS):
+        for i in each("i", t.FAILING):
             with when(s.fault[i].differs(GOOD) & t.leans_on[m, i]):
                 lost.set(lost + 1)
                 allowed.set(allowed & t.may_lose[m, i])
@@ -271,7 +313,7 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
             found = let("found", flag(False))
             for j in each("j", t.JUDGED):
                 fits = let("fits", t.judged_model[j].equals(m))
-                for i in each("i", t.SENSORS):
+                for i in each("i", t.FAILING):
                     gone = let("gone", s.fault[i].differs(GOOD) & t.leans_on[m, i])
                     fits.set(fits & t.judged_without[j, i].equals(gone))
                 found.set(found | fits)

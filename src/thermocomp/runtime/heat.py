@@ -1,0 +1,164 @@
+"""Supervision of spindle speeds: the heat that a speed should cause is compared with an estimate from temperatures.
+
+State in, state out, as in `thermocomp.runtime.watch`, of which it is a part: a speed that is missing or wrong is
+replaced by the one that explains the temperatures. A missing speed is trusted again once it has agreed with them for as
+long as it was missing, at most ten minutes; a wrong one is not trusted until a restart.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core import lagbank
+from thermocomp.core.heatcheck import find_limits
+from thermocomp.core.watch import Watch
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int8]
+
+#: a missing speed, as in `thermocomp.runtime.watch.WORDS`
+MISSING = 1
+
+_EMPTY: FloatArray = np.empty(0)
+
+
+class HeatState(NamedTuple):
+    """State of the supervision between two readings; empty without checks."""
+
+    heat: FloatArray = _EMPTY  #: (..., n_checks), of the speeds as read
+    stored: FloatArray = _EMPTY  #: (..., n_checks), the same after a further lag
+    estimate: FloatArray = _EMPTY  #: (..., n_checks), from the temperatures
+    reach: FloatArray = _EMPTY  #: (..., n_checks), error of the estimate that substitutes of temperatures may cause
+    states: FloatArray = _EMPTY  #: (..., n_states), speed states of the watch with the estimated speeds
+    since: FloatArray = _EMPTY  #: (..., n_checks), start of a difference beyond its limit; nan: none [s]
+    doubt: FloatArray = _EMPTY  #: (..., n_checks), start of one that cutting may explain; nan: none [s]
+    gone: FloatArray = _EMPTY  #: (..., n_speeds), time at which a speed was first missing [s]
+    back: FloatArray = _EMPTY  #: (..., n_speeds), time since which a missing speed agrees; nan: it does not [s]
+    fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watch.WORDS`
+
+
+def begin(watch: Watch, runs: tuple[int, ...] = ()) -> HeatState:
+    """Return the state before the first reading."""
+    n, speeds = (*runs, len(watch.checks)), (*runs, len(watch.speeds))
+    return HeatState(
+        heat=np.zeros(n),
+        stored=np.zeros(n),
+        estimate=np.zeros(n),
+        reach=np.zeros(n),
+        states=np.zeros((*runs, len(watch.states))),
+        since=np.full(n, np.nan),
+        doubt=np.full(n, np.nan),
+        gone=np.full(speeds, np.nan),
+        back=np.full(speeds, np.nan),
+        fault=np.zeros(speeds, dtype=np.int8),
+    )
+
+
+def start(watch: Watch, state: HeatState, memory: FloatArray, speeds: FloatArray) -> HeatState:
+    """Return the state at the start, at steady state: speeds (..., n_speeds) [1/min], memory of the watch."""
+    heat = find_heat(watch, speeds)
+    states = memory[..., memory.shape[-1] - len(watch.states) :]
+    return state._replace(heat=heat, stored=heat, estimate=heat, states=states)
+
+
+def find_heat(watch: Watch, speeds: FloatArray) -> FloatArray:
+    """Return the relative heat of speeds (..., n_speeds) for each check, (..., n_checks)."""
+    share, of = np.minimum(np.abs(speeds) / watch.top_speed, watch.thresholds.heat_factor), watch.heat_constants
+    share = np.where(share > watch.thresholds.least_share, share, 0.0)
+    return np.asarray(share[..., of.speeds] ** of.powers)
+
+
+def find_speeds(watch: Watch, state: HeatState, read: FloatArray) -> FloatArray:
+    """Return the speeds that explain the temperatures, (..., n_speeds) [1/min]; as read, if not supervised."""
+    found = read.copy()
+    for k, check in enumerate(watch.deciding.tolist()):
+        if check >= 0:
+            c, heat = watch.checks[check], state.estimate[..., check]
+            share = np.where(heat > c.unseen, heat, 0.0) ** (1.0 / c.power)
+            found[..., k] = watch.top_speed * np.minimum(share, watch.thresholds.heat_factor)
+    return found
+
+
+def advance(
+    watch: Watch, state: HeatState, read: FloatArray, used: FloatArray, lags: FloatArray, failed: BoolArray, dt: float
+) -> HeatState:
+    """Advance heats, their estimates and the speed states.
+
+    Parameters
+    ----------
+    read : ndarray of shape (..., n_speeds)
+        Speeds as read; nan if missing [1/min].
+    used : ndarray of shape (..., n_sensors)
+        Temperatures minus their reference, with substitutes [degC].
+    lags : ndarray of shape (..., n_lags)
+        Lags of the temperatures.
+    failed : ndarray of bool of shape (..., n_sensors)
+        Temperatures with substitutes.
+    """
+    direct, lagged = watch.heat_read_out
+    estimate = used @ direct + lags @ lagged
+    found = find_speeds(watch, state._replace(estimate=estimate), read)
+    caused = find_heat(watch, np.where(np.isnan(read), found, read))
+    heat = lagbank.advance(state.heat, caused, dt, watch.heat_constants.lags)
+    stored = lagbank.follow(state.stored, heat, np.full(heat.shape, dt / watch.thresholds.heat_stored))
+    bank, lag = watch.bank, len(watch.bank.rates) - len(watch.bank.gain)
+    share = np.minimum(np.abs(found.take(watch.state_speeds, axis=-1)) / bank.top, watch.thresholds.heat_factor)
+    rates = bank.rates[lag:] + share * bank.gain
+    states = lagbank.follow(state.states, share**bank.powers, dt * rates)
+    return state._replace(heat=heat, stored=stored, estimate=estimate, reach=failed @ watch.heat_reach, states=states)
+
+
+def limits(watch: Watch, state: HeatState) -> FloatArray:
+    """Return the largest permitted difference of each heat from its estimate, (..., n_checks)."""
+    difference = state.heat - state.estimate
+    return find_limits(difference, state.heat, state.stored, watch.heat_constants, watch.thresholds) + state.reach
+
+
+def residuals(watch: Watch, state: HeatState) -> FloatArray:
+    """Return the difference of each heat from its estimate, (..., n_checks); 0 for a speed that is not trusted."""
+    trusted = state.fault.take(watch.heat_constants.speeds, axis=-1) == 0
+    return np.where(trusted, state.heat - state.estimate, 0.0)
+
+
+def find_lasting(watch: Watch, state: HeatState, time: float) -> tuple[HeatState, BoolArray]:
+    """Return the speeds, (..., n_speeds), whose heat has differed from its estimate for too long."""
+    apart = np.abs(residuals(watch, state))
+    since = _begin(state.since, apart > limits(watch, state), time)
+    doubt = _begin(state.doubt, apart > watch.heat_constants.off + state.reach, time)
+    with np.errstate(invalid="ignore"):
+        lasting = time - since >= watch.thresholds.fault_duration
+    of = watch.heat_constants.speeds
+    speeds = [lasting[..., of == k].any(axis=-1) for k in range(len(watch.speeds))]
+    return state._replace(since=since, doubt=doubt), np.stack(speeds, axis=-1)
+
+
+def _begin(since: FloatArray, holds: BoolArray, time: float) -> FloatArray:
+    """Return the time since which a condition holds; nan where it does not."""
+    return np.where(holds, np.where(np.isfinite(since), since, time), np.nan)
+
+
+def in_doubt(watch: Watch, state: HeatState, time: float) -> BoolArray:
+    """Return whether a speed has lately become doubtful, (...,): soon it will be clear whether it is wrong."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((time - state.doubt < watch.thresholds.speed_doubt).any(axis=-1))
+
+
+def lose(state: HeatState, time: float, lost: BoolArray) -> HeatState:
+    """Return the state with missing speeds, (..., n_speeds), not trusted."""
+    new = lost & (state.fault == 0)
+    fault = np.where(new, MISSING, state.fault).astype(np.int8)
+    return state._replace(fault=fault, gone=np.where(new, time, state.gone))
+
+
+def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray) -> HeatState:
+    """Trust a missing speed again once it has agreed with the temperatures for as long as it was missing."""
+    far = np.abs(state.heat - state.estimate) > limits(watch, state)
+    of = watch.heat_constants.speeds
+    agrees = [~far[..., of == k].any(axis=-1) for k in range(len(watch.speeds))]
+    fits = (state.fault == MISSING) & ~lost & np.stack(agrees, axis=-1)
+    back = _begin(state.back, fits, time)
+    with np.errstate(invalid="ignore"):
+        again = fits & (time - back >= np.minimum(back - state.gone, watch.thresholds.return_time))
+    return state._replace(fault=np.where(again, 0, state.fault).astype(np.int8), back=np.where(again, np.nan, back))
