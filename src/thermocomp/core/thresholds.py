@@ -28,6 +28,7 @@ def _fixed(value: float, unit: str, reason: str, source: str) -> float:
 
 
 _START, _WATCH, _PROBING, _OWN = "decision 0021", "decision 0030", "decision 0031", "choice of this project"
+_FEED = "decision 0046"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +77,17 @@ class Thresholds:
     swap_evidence: float = _fixed(
         0.1, "", "a swap of two sensors is excluded once it has increased the mean square residual by this", _WATCH
     )
+
+    # repetition of all temperatures
+    repeat_factor: float = _fixed(
+        15.0, "intervals", "temperatures that repeat for this many usual intervals are not measured any more", _FEED
+    )
+    repeat_margin: float = _fixed(
+        1.5, "", "repetition is counted only if that is longer than the longest one on a sound machine by this", _FEED
+    )
+    repeat_changes: float = _fixed(20.0, "changes", "number of changes after which an interval is usual", _FEED)
+    repeat_memory: float = _fixed(100.0, "changes", "number of changes over which the interval is averaged", _FEED)
+    repeat_moved: float = _fixed(3.0, "resolutions", "change of a prediction that a temperature must show", _FEED)
 
     # adaptation by probings
     offset_decay: float = _fixed(4 * 3600.0, "s", "an offset represents the present state of the machine", _PROBING)
@@ -132,6 +144,11 @@ class Thresholds:
             raise SettingError(
                 f"thresholds: least_temperature = {self.least_temperature:g} degC must be below most_temperature = "
                 f"{self.most_temperature:g} degC"
+            )
+        if not 1.0 <= self.repeat_changes <= self.repeat_memory:
+            raise SettingError(
+                f"thresholds: repeat_changes = {self.repeat_changes:g} must be from 1 to repeat_memory = "
+                f"{self.repeat_memory:g}"
             )
         if not max(self.suspect, self.suspect_first) < self.implausible:
             raise SettingError(

@@ -10,6 +10,7 @@ from thermocomp.core.state import State
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
+from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "unknown", "first start"]
@@ -56,6 +57,7 @@ class CompensatorState(NamedTuple):
     away: float | None  #: outage before the last restart; None once corrections have caught up [s]
     #: first arrival time of each key of a probing, by target or axis [s]
     probed: Mapping[str, dict[str, float]] = MappingProxyType({})
+    feed: FeedState = FeedState()  #: repetition of the temperatures
 
 
 class Compensated(NamedTuple):

@@ -279,7 +279,7 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
     s = s._replace(moving=moving)
     lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all are constant, as with a stopped logger
     long = same & calm & lives & (s.time - s.still > watch.limits("still"))
-    return s, (moves & (s.time - moving >= watch.thresholds.fault_duration)) | long
+    return s, (moves & lives & (s.time - moving >= watch.thresholds.fault_duration)) | long
 
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:

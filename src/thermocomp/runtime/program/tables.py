@@ -18,6 +18,17 @@ from thermocomp.runtime.program.tree import Function
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
+#: thresholds of the gate and of the feed
+OF_GATE = (
+    "stopped_speed",
+    "clock_skew",
+    "zero_change",
+    "repeat_factor",
+    "repeat_margin",
+    "repeat_changes",
+    "repeat_memory",
+    "repeat_moved",
+)
 #: thresholds that only the watch needs, and those it has in common with the gate
 OF_WATCH = (
     "least_temperature",
@@ -85,7 +96,10 @@ def gather(compensator: Compensator) -> Tables:
         "at_rest": zeroing.at_rest,
         "otherwise": zeroing.otherwise,
         "speed_channel": place.get(zeroing.speed, 0),
-        **{name: getattr(thresholds, name) for name in ("stopped_speed", "clock_skew", "zero_change")},
+        **{name: getattr(thresholds, name) for name in OF_GATE},
+        "feed_channel": [place[name] for name in compensator.feed.names],
+        "may_count": compensator.feed.counts,
+        "feed_place": compensator.feed.places[0] if watch and compensator.feed.names else [0] * len(sensors),
         **_ranges(ranges, models, place, thresholds),
         "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
         "set_range": [ranges.index(i) for s in sets for i in s],
@@ -102,6 +116,8 @@ def gather(compensator: Compensator) -> Tables:
     values |= own_values
     sizes = {
         "CHANNELS": len(channels),
+        "FED": len(compensator.feed.names),
+        "has_feed": int(bool(compensator.feed.names)),
         "RANGES": len(ranges),
         "MODELS": len(models),
         "TARGETS": len(lines),
@@ -287,7 +303,7 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "gain": bank.gain.tolist(),
         "direct": direct.tolist(),
         "weight": weight.tolist(),
-        **{f"{name}_limit": watch.limits(name).tolist() for name in ("off", "jump", "moved", "still")},
+        **{f"{name}_limit": watch.limits(name).tolist() for name in ("off", "jump", "moved", "frozen", "still")},
         "unseen": unseen.tolist(),
         "shape": (watch.signatures / unseen[:, None]).tolist(),
         "pair_first": watch.pairs[0].tolist(),

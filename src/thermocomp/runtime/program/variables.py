@@ -48,9 +48,25 @@ class Kept(Record):
     slope = numbers("slope in force [um/m]", "TARGETS")
     idle = numbers("time for which no model has driven the correction [s]", "TARGETS", time=True)
     status = wholes("0 starts, 1 active, 2 holding, 3 fading, 4 shadow", "TARGETS")
-    rejected = whole("why the reading was not used: 0 it was used, 1 its time, 2 a value, 3 not a valid start")
+    rejected = whole(
+        "why the reading was not used: 0 used, 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped"
+    )
     outside = whole("number of inputs beyond the trained range")
     fault = wholes("state of each sensor: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped", "SENSORS")
+
+    # repetition of all temperatures: see `thermocomp.runtime.feed.FeedState`
+    counter = number("last number of a reading; 0: they are not numbered", time=True)
+    waited = number("time for which it has not changed [s]", time=True)
+    feed_begun = truth("there is a reading with which to compare the next one")
+    fed = numbers("last temperatures [degC]", "FED")
+    feed_step = numbers("smallest change of each [degC]", "FED")
+    repeated = number("readings since a temperature changed", time=True)
+    feed_changes = number("number of intervals between changes that were averaged", time=True)
+    feed_usual = number("their mean [readings]", time=True)
+    feed_longest = number("longest one, not counting stops of the source [readings]", time=True)
+    feed_known = truth("the predictions at the first repeated reading are known")
+    feed_predicted = numbers("predictions at the first repeated reading [degC]", "SENSORS")
+    feed_moved = truth("a temperature should have changed since")
 
     # of the watch over the temperatures: see `thermocomp.runtime.watch.WatchState`
     looked = truth("the watch has started")
@@ -97,6 +113,7 @@ class Work(Record):
 
     age = number("age of the values [s]", time=True)
     dt = number("time since the last call [s]", time=True)
+    counter = number("number of the reading; 0: readings are not numbered", time=True)
     value = numbers("values by channel", "CHANNELS")
     given = truths("the channel has a value", "CHANNELS")
     now = number("time of the reading [s]", time=True)
@@ -169,6 +186,13 @@ class Constants(Record):
     stopped_speed = threshold("stopped_speed")
     clock_skew = threshold("clock_skew", time=True)
     zero_change = threshold("zero_change")
+    feed_channel = wholes("channels of the temperatures", "FED")
+    may_count = truth("temperatures that repeat for long are not measured any more")
+    repeat_factor = threshold("repeat_factor", time=True)
+    repeat_margin = threshold("repeat_margin", time=True)
+    repeat_changes = threshold("repeat_changes", time=True)
+    repeat_memory = threshold("repeat_memory", time=True)
+    repeat_moved = threshold("repeat_moved")
     speed_channel = whole("channel that shows whether the spindle is stopped")
     channel = wholes("channel of each trained range", "RANGES")
     temperature = truths("the input is a temperature", "RANGES")
@@ -221,6 +245,7 @@ class Constants(Record):
     level_begin = wholes("first of its trained values", "ENDS_OF_LEVELS")
     level = numbers("trained values", "LEVELS")
     sensor_channel = wholes("channel of each sensor", "SENSORS")
+    feed_place = wholes("place of each sensor among the temperatures that may repeat", "SENSORS")
     sensor_input = wholes("input of the watch", "SENSORS")
     watch_channel = wholes("channel of each input of the watch", "WATCHED")
     watch_rezero = truths("the input is relative to the start", "WATCHED")
@@ -255,6 +280,7 @@ class Constants(Record):
     off_limit = numbers("limit of a lasting difference [degC]", "SENSORS")
     jump_limit = numbers("limit of a jump [degC]", "SENSORS")
     moved_limit = numbers("limit of the prediction's change while a reading is constant [degC]", "SENSORS")
+    frozen_limit = numbers("limit of that change while all readings are constant [degC]", "SENSORS")
     still_limit = numbers("longest constant reading [s]", "SENSORS", time=True)
     unseen = numbers("error of a prediction on unseen cycles [degC]", "SENSORS")
     shape = numbers("effect of a failure on all differences, immediate and final", "SHAPES", "SENSORS", "SENSORS")
@@ -263,6 +289,7 @@ class Constants(Record):
 
     # sizes of arrays, and features of a compensator
     CHANNELS = size("values of a reading")
+    FED = size("temperatures whose repetition is monitored")
     RANGES = size("inputs of the models")
     SETS = size("sets of inputs of a model")
     TARGETS = size("corrections")
@@ -278,6 +305,7 @@ class Constants(Record):
     JUDGED = size("combinations of sensors without which a model was judged")
     has_absolute = option("a model is not relative to the zero")
     has_zero = option("a model is relative to the zero")
+    has_feed = option("repeated temperatures are monitored")
     has_speed = option("a channel shows whether the spindle is stopped")
     watched = option("temperatures are watched")
     watch_waits = option("the watch is relative to the zero")

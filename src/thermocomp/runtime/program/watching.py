@@ -219,7 +219,7 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
         with when(moves & ~s.is_moving[i]):
             s.moving[i] = w.now
         s.is_moving[i] = moves
-        w.stuck[i] = moves & (w.now - s.moving[i] >= t.fault_duration)
+        w.stuck[i] = moves & lives & (w.now - s.moving[i] >= t.fault_duration)
         with when(~w.changed[i] & w.calm[i] & lives & (w.now - s.still[i] > t.still_limit[i])):
             w.stuck[i] = True
 
