@@ -96,9 +96,9 @@ class Compensator:
     @cached_property
     def feed(self) -> Feed:
         """Temperatures of the models and watches, whose repetition is monitored."""
-        inputs = [i for owner in (*self.models, *self.watches) for i in owner.inputs if i.quantity == "temperature"]
-        names = dict.fromkeys(i.name for i in inputs) if self.repeats == "watch" else ()
-        return Feed(tuple(names), self.watches, self.thresholds)
+        inputs = [i for m in self.models for i in m.inputs] + [i for w in self.watches for i in w.inputs]
+        heat = dict.fromkeys(i.name for i in inputs if i.quantity == "temperature")
+        return Feed(tuple(heat) if self.repeats == "watch" else (), self.watches, self.thresholds)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:

@@ -1,4 +1,4 @@
-"""Sources that report by exception: a value is reported when it changes, and a counter shows that the others are valid."""
+"""Sources that report by exception: only changes; a counter shows that the other values are valid."""
 
 from collections.abc import Mapping
 
@@ -23,7 +23,7 @@ class ReportedChanges:
         self._latest.update(values)
 
     def complete(self, reading: Reading) -> Reading:
-        """Return the values that are valid at the time of a reading: all if the counter has advanced, else the changes."""
+        """Return the values that are valid now: all if the counter has advanced, else those that have changed."""
         changes = {name: v for name, v in reading.values.items() if self._latest.get(name) != v}
         self._latest.update(changes)
         advances = self._counter in changes

@@ -149,6 +149,7 @@ class Work(Record):
     calm = truths("the difference from the prediction is reliable", "SENSORS")
     able = truths("the sensor may have failed", "SENSORS")
     changed = truths("the reading differs from the previous one", "SENSORS")
+    last_change = number("time at which a temperature last changed [s]", time=True)
     difference = numbers("difference of reading and prediction [degC]", "SENSORS")
     change = numbers("changes of the inputs of the watch", "WATCHED")
     weighed = numbers("residual to be explained by a failure [degC]", "SENSORS")
