@@ -83,8 +83,12 @@ class Thresholds:
         15.0, "intervals", "temperatures that repeat for this many usual intervals are not measured any more", _FEED
     )
     repeat_margin: float = _fixed(
-        3.0, "", "repetition is counted only if that is this many times the longest one on a sound machine", _FEED
+        3.0,
+        "",
+        "repetition is counted only if that is this many times the longest one on a sound machine",
+        _FEED,
     )
+    repeat_wait: float = _fixed(3.0, "intervals", "between two updates of a source only predictions move", _FEED)
     repeat_changes: float = _fixed(20.0, "changes", "number of changes after which an interval is usual", _FEED)
     repeat_memory: float = _fixed(100.0, "changes", "number of changes over which the interval is averaged", _FEED)
     repeat_moved: float = _fixed(3.0, "resolutions", "change of a prediction that a temperature must show", _FEED)

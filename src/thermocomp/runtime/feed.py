@@ -129,6 +129,8 @@ class Feed:
             return feed._replace(predicted=()), ""
         if not feed.predicted:
             return feed._replace(predicted=tuple(s.predicted for s in states)), ""
+        if not feed.changes or feed.repeated <= self._thresholds.repeat_wait * feed.usual:
+            return feed, ""
         of = zip(self._watches, states, feed.predicted, self.places, strict=True)
         for watch, state, before, places in of:
             moved, steps = state.predicted - before, np.array([feed.steps[p] for p in places])

@@ -1,7 +1,7 @@
 """Repetition of all temperatures with scalars and loops only: see `thermocomp.runtime.feed` for explanations."""
 
 from thermocomp.runtime.feed import LARGEST, MOST_REPEATED, NONE
-from thermocomp.runtime.program.language import choose, each, let, otherwise, otherwise_when, procedure, when
+from thermocomp.runtime.program.language import choose, each, let, otherwise_when, procedure, when
 from thermocomp.runtime.program.values import Whole, flag, integer
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import GOOD
@@ -81,7 +81,7 @@ def compare_predictions(s: Kept, w: Work, t: Constants) -> None:
             for i in each("i", t.SENSORS):
                 s.feed_predicted[i] = s.predicted[i]
             s.feed_known = s.looked
-        with otherwise():
+        with otherwise_when((s.feed_changes > 0.0) & (s.repeated > t.repeat_wait * s.feed_usual)):
             for i in each("i", t.SENSORS):
                 moved = let("moved", abs(s.predicted[i] - s.feed_predicted[i]))
                 least = let("least", t.repeat_moved * s.feed_step[t.feed_place[i]])

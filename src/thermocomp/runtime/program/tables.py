@@ -25,6 +25,7 @@ OF_GATE = (
     "zero_change",
     "repeat_factor",
     "repeat_margin",
+    "repeat_wait",
     "repeat_changes",
     "repeat_memory",
     "repeat_moved",

@@ -191,6 +191,7 @@ class Constants(Record):
     may_count = truth("temperatures that repeat for long are not measured any more")
     repeat_factor = threshold("repeat_factor", time=True)
     repeat_margin = threshold("repeat_margin", time=True)
+    repeat_wait = threshold("repeat_wait", time=True)
     repeat_changes = threshold("repeat_changes", time=True)
     repeat_memory = threshold("repeat_memory", time=True)
     repeat_moved = threshold("repeat_moved")
