@@ -23,7 +23,7 @@ from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.feed import Feed, FeedState
+from thermocomp.runtime.feed import FeedState, TemperatureFeed
 from thermocomp.runtime.state import Compensated, CompensatorState
 from thermocomp.virtual import datasets as virtual
 
@@ -242,7 +242,7 @@ def test_measured_raw_readings_are_no_stop(shared_data: Path, resolution: float,
     tool = {shared_data / "fl_thermal" / "recording.csv": [f"t{k}_C" for k in range(1, 17)]}
     assert len(printers) == 2
     for path, names in (printers | tool).items():
-        feed, state = Feed(names, [], THRESHOLDS), FeedState()
+        feed, state = TemperatureFeed(names, [], THRESHOLDS), FeedState()
         for row in recorded(path, names):
             shown = {n: round(v / resolution) * resolution if resolution else v for n, v in row.items()}
             for _ in range(times):
@@ -258,7 +258,7 @@ class Source:
     """A source of temperatures that are called by number."""
 
     def __init__(self, count: int) -> None:
-        self.feed, self.state = Feed([str(k) for k in range(count)], [], THRESHOLDS), FeedState()
+        self.feed, self.state = TemperatureFeed([str(k) for k in range(count)], [], THRESHOLDS), FeedState()
         self.values, self.rng = np.full(count, 20.0), np.random.default_rng(1)
 
     def say(self, times: int, changed: int | None = None, counter: float = 0.0, travel: float = 1.0) -> list[str]:
@@ -335,9 +335,9 @@ def test_recordings_that_repeat_forbid_to_count() -> None:
     watch = watched_model().watch
     assert watch is not None
     assert watch.repeats == 1.0
-    assert Feed([*watch.names], [watch], THRESHOLDS).counts
-    assert Feed([*watch.names], [replace(watch, repeats=5.0)], THRESHOLDS).counts
-    assert not Feed([*watch.names], [replace(watch, repeats=5.1)], THRESHOLDS).counts
+    assert TemperatureFeed([*watch.names], [watch], THRESHOLDS).counts
+    assert TemperatureFeed([*watch.names], [replace(watch, repeats=5.0)], THRESHOLDS).counts
+    assert not TemperatureFeed([*watch.names], [replace(watch, repeats=5.1)], THRESHOLDS).counts
     coarse = fitted(SIX, 0.5, 0.05).watch
     assert coarse is not None
     assert coarse.repeats > 5.0

@@ -33,7 +33,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import Advanced, advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.driving import Driven, drive, rest, travel_time
-from thermocomp.runtime.feed import Feed
+from thermocomp.runtime.feed import TemperatureFeed
 from thermocomp.runtime.gate import explain_implausible
 from thermocomp.runtime.geometry.straight import best_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
@@ -94,11 +94,11 @@ class Compensator:
         return tuple(Lookout(w) for w in self.watches)
 
     @cached_property
-    def feed(self) -> Feed:
+    def feed(self) -> TemperatureFeed:
         """Temperatures of the models and watches, whose repetition is monitored."""
         inputs = [i for m in self.models for i in m.inputs] + [i for w in self.watches for i in w.inputs]
         heat = dict.fromkeys(i.name for i in inputs if i.quantity == "temperature")
-        return Feed(tuple(heat) if self.repeats == "watch" else (), self.watches, self.thresholds)
+        return TemperatureFeed(tuple(heat) if self.repeats == "watch" else (), self.watches, self.thresholds)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:

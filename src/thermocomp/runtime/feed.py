@@ -40,7 +40,7 @@ class FeedState(NamedTuple):
     waited: float = 0.0  #: time for which it has not changed [s]
 
 
-class Feed:
+class TemperatureFeed:
     """Temperatures of a compensator, and the rules for their repetition.
 
     Parameters
