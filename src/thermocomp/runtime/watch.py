@@ -285,7 +285,7 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
 
 def _last_change(s: WatchState, calm: BoolArray) -> FloatArray:
     """Return when a temperature last changed, (..., 1): if all repeat, the source has stopped, and no sensor failed."""
-    return np.where(calm, s.still, -np.inf).max(axis=-1, keepdims=True, initial=-np.inf)
+    return np.asarray(np.where(calm, s.still, -np.inf).max(axis=-1, keepdims=True, initial=-np.inf))
 
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
