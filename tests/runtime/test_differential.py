@@ -131,6 +131,30 @@ def test_structured_text_is_numpy(seed: int) -> None:
     check(seed, StructuredText, count=count, first=IN_TEXT[1] if seed in IN_TEXT[0] else None, within=1e-9)
 
 
+@pytest.mark.parametrize("seed", seeds((3, 5, 6, 11, 12), range(1200, 1240)))
+def test_repeated_temperatures_are_numpy(seed: int) -> None:
+    """Some or all temperatures change, after intervals of any length, from the first readings on."""
+    drawn, count, rng = draw_compensator(seed), 1500, np.random.default_rng((7, seed))
+    tables, stream = gather(drawn.compensator), draw_stream(drawn, seed, count)
+    heat = [k for k, c in enumerate(tables.channels) if c.quantity == "temperature"]
+    values = draw_values(rng, drawn.plant, tables.channels, 10.0 * np.arange(count, dtype=np.float64))
+    values[:, heat] += rng.normal(0.0, 0.01, (count, len(heat)))
+    k, length = 0, 1
+    while k < count:
+        before, length = length, int(rng.choice([1, 2, 12, 40, 90], p=[0.7, 0.2, 0.04, 0.04, 0.02]))
+        values[k : k + length, heat] = values[k, heat]
+        if k and rng.random() < (0.5 if before <= 2 else 0.05):  # few change, or half of them
+            same = rng.permutation(heat)[: (len(heat) + int(rng.integers(0, 2))) // 2]
+            values[k : k + length, same] = values[k - 1, same]
+        k += length
+    never = np.zeros(count, dtype=np.bool_)
+    stream = stream._replace(values=values, age=np.zeros(count), dt=np.full(count, 10.0), clock=np.zeros(count))
+    stream = stream._replace(restarts=never, resumed=never, stored=rng.random(count) < 0.01)
+    said = run_numpy(drawn.compensator, tables, stream)
+    assert 4 in said.decisions[:, -2] or len(heat) < 3  # all intervals of a single temperature are learned
+    assert not find_apart(tables, stream, said, MachineCode(tables).run(stream), 1e-12).size
+
+
 def test_the_draws_contain_what_matters() -> None:
     families, in_text, policies, statuses, faults, codes = (set[object]() for _ in range(6))
     for seed in SHORT[0]:

@@ -25,6 +25,7 @@ from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.feed import FeedState, TemperatureFeed
 from thermocomp.runtime.state import Compensated, CompensatorState
+from thermocomp.runtime.watch import GOOD, STUCK, begin, look
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
@@ -249,6 +250,38 @@ def test_measured_raw_readings_are_no_stop(shared_data: Path, resolution: float,
                 state, why = feed.heed(state, shown, 0.0, 10.0, 60.0)
                 assert why == "", (path.name, why)
         assert state.changes == THRESHOLDS.repeat_memory
+
+
+def test_while_all_temperatures_repeat_no_sensor_is_accused() -> None:
+    """The watch alone, with a speed that goes on: its predictions move by more than any limit."""
+    watch = watched_model().watch
+    assert watch is not None
+    values = np.array([22.0, 21.0, 20.5, 0.0])
+    state, _ = look(watch, begin(watch, np.array([22.0, 21.0, 20.5, 0.0])), 0.0, values)
+    values[:3] += 0.1
+    for k in range(1, 400):
+        state, _ = look(watch, state, 60.0 * k, np.append(values[:3], 3000.0))
+    moved = np.abs(state.predicted - 0.1)
+    assert (moved > watch.limits("off")).any()
+    assert (moved > watch.limits("moved")).any()
+    assert (state.fault == GOOD).all()
+
+
+def test_a_failed_sensor_need_not_change() -> None:
+    watch = watched_model().watch
+    assert watch is not None
+    feed = TemperatureFeed(watch.names, [watch], THRESHOLDS)
+    limit = watch.limits("frozen")
+    state = begin(watch)._replace(time=0.0, predicted=np.zeros(3))
+    before = FeedState((20.0,) * 3, (0.01,) * 3, repeated=4.0, changes=50.0, usual=1.0, predicted=(np.zeros(3),))
+    moved = state._replace(predicted=np.array([1.01 * limit[0], 0.99 * limit[1], 0.0]))
+    _, why = feed.compare_predictions(before, [moved])
+    assert f"({watch.names[0]} should have changed by +" in why
+    faults = np.array([STUCK, GOOD, GOOD], dtype=np.int8)
+    assert feed.compare_predictions(before, [moved._replace(fault=faults)])[1] == ""
+    coarse = before._replace(steps=(limit[0], 0.01, 0.01))  # as seen live
+    assert feed.compare_predictions(coarse, [moved])[1] == ""
+    assert feed.compare_predictions(before._replace(repeated=3.0), [moved])[1] == ""
 
 
 # -- what is learned ---------------------------------------------------------------------------------------------------
