@@ -33,13 +33,14 @@ _DRIVER = """
 void *begin(void) {{ {name}_state *s = malloc(sizeof *s); {name}_start(s); return s; }}
 void end(void *s) {{ free(s); }}
 
-void run(void *at, int n, const tc_real *values, const double *age, const double *dt, double *said, int *told)
+void run(void *at, int n, const tc_real *values, const double *age, const double *dt, const double *counter,
+         double *said, int *told)
 {{
     {name}_state *s = at;
     int k, j;
 
     for (k = 0; k < n; k++) {{
-        {name}_step(s, values + k * {n}, age[k], dt[k]);
+        {name}_step_counted(s, values + k * {n}, age[k], dt[k], counter[k]);
         for (j = 0; j < {targets}; j++) {{
             *said++ = s->correction[j];
             *said++ = s->slope[j];
@@ -109,8 +110,8 @@ class CompiledBlock:
         n = len(readings.age)
         said, told = np.empty((n, 2 * targets + models)), np.empty((n, targets + sensors + 2), dtype=np.int32)
         given = np.ascontiguousarray(readings.values, dtype=self._real)
-        age, dt = (np.ascontiguousarray(a, dtype=np.float64) for a in (readings.age, readings.dt))
-        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, age, dt, said, told)]
+        age, dt, counter = (np.ascontiguousarray(a) for a in readings.columns[:, -3:].T)
+        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, age, dt, counter, said, told)]
         state = ctypes.c_void_p(self._library.begin())
         self._library.run(state, n, *pointers)
         self._library.end(state)

@@ -34,6 +34,7 @@ class Stream(NamedTuple):
     values: FloatArray  #: (n_calls, n_channels)
     age: FloatArray  #: (n_calls,) [s]
     dt: FloatArray  #: (n_calls,), since the call before [s]
+    counter: FloatArray  #: (n_calls,), number of the reading; 0: not numbered
     clock: FloatArray  #: (n_calls,), what the clock of the readings is ahead of the time since the start [s]
     restarts: BoolArray  #: (n_calls,), before it everything but the corrections is forgotten
     stored: BoolArray  #: (n_calls,), before it the state goes through its file
@@ -75,6 +76,7 @@ def draw_stream(drawn: Drawn, seed: int, count: int) -> Stream:
         values=values,
         age=age,
         dt=dt,
+        counter=draw_counter(rng, count) if seed % 2 else np.zeros(count),
         clock=clock,
         restarts=restarts,
         stored=rng.random(count) < 4.0 / count,
@@ -114,6 +116,17 @@ def draw_ages(rng: Rng, dt: FloatArray, limits: Limits, *, steady: bool) -> Floa
         span = _spell(rng, count, 0.2)
         age[span] = usual + np.cumsum(np.nan_to_num(dt[span], posinf=0.0, neginf=0.0))
     return age
+
+
+def draw_counter(rng: Rng, count: int) -> FloatArray:
+    """Return numbers of readings: some of several calls, some that stop, some that are not numbered or start again."""
+    counter = 1.0 + np.cumsum(rng.random(count) < rng.choice([0.3, 0.95, 1.0]))
+    for _ in range(int(rng.integers(0, 4))):
+        span = _spell(rng, count, 0.1)
+        counter[span] = counter[span.start]
+    span = _spell(rng, count, 0.1)
+    counter[span] = rng.choice([0.0, -1.0, 2e12])
+    return counter
 
 
 def draw_values(rng: Rng, plant: Plant, channels: Sequence[Input], time: FloatArray, rest: int = 0) -> FloatArray:

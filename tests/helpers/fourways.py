@@ -54,7 +54,9 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
     """
     names, decisions, numbers, shown = [c.name for c in tables.channels], [], [], float(stream.clock[0])
     state, time, begun, outside = compensator.start(), 0.0, False, 0
-    for k, (values, age, dt, ahead, restarts, stored, resumed) in enumerate(zip(*map(_listed, stream), strict=True)):
+    for k, (values, age, dt, counter, ahead, restarts, stored, resumed) in enumerate(
+        zip(*map(_listed, stream), strict=True)
+    ):
         if restarts:  # longer ago than the memory of the models
             state = resume(_stored(state, compensator), compensator.start(), 2 * THRESHOLDS.resumable)
             time, begun, outside = 0.0, False, 0
@@ -75,7 +77,8 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
         if k % 2:  # a source tells in two ways that there is no value
             table = {name: v for name, v in table.items() if not math.isnan(v)}
         now = time + shown if good else math.nan
-        state, said = compensator.step(state, Reading(now - age, table), now, tick=time if good else math.nan)
+        reading = Reading(now - age, table, counter=counter)
+        state, said = compensator.step(state, reading, now, tick=time if good else math.nan)
         if not said.rejected:
             outside = len(_outside(tables, state))
         decisions.append([*_decisions(tables, said), outside])
@@ -113,9 +116,11 @@ def _outside(tables: Tables, state: CompensatorState) -> set[Input]:
 
 
 def rejected(why: str) -> int:
-    """Return the code of a reason: 1 its time, 2 a value, 3 not a valid start."""
+    """Return the code of a reason: 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped."""
     if not why:
         return 0
+    if why.endswith("the source has stopped"):
+        return 4
     if "plausible as a start" in why:
         return 3
     return 2 if why.endswith((" is missing", " is not plausible")) else 1
@@ -137,7 +142,7 @@ class MachineCode:
         """Run it from the start."""
         memory = FlatMemory(self._tables.sizes, self._tables.values)
         pointers = [memory.arrays[name].ctypes.data for name in ARRAYS]
-        value, age, dt = (memory.find("w", name) for name in ("value", "age", "dt"))
+        value, age, dt, counter = (memory.find("w", name) for name in ("value", "age", "dt", "counter"))
         seen = [[memory.find("s", name).reshape(-1) for name in group] for group in (DECISIONS, NUMBERS)]
         kept = [memory.find("s", name) for name in ("correction", "slope")]
         decisions, numbers = [], []
@@ -148,6 +153,7 @@ class MachineCode:
                 for array, was in zip(kept, in_force, strict=True):
                     array[:] = was
             value[:], age[...], dt[...] = stream.values[k], stream.age[k], stream.dt[k]
+            counter[...] = stream.counter[k]
             self._step(*pointers)
             decisions.append(np.concatenate(seen[0]))
             numbers.append(np.concatenate(seen[1]))
@@ -157,8 +163,8 @@ class MachineCode:
 _DRIVER = """
 #include "{name}.c"
 
-void run(int n, const tc_real *values, const double *age, const double *dt, const unsigned char *restarts,
-         double *numbers, int *decisions)
+void run(int n, const tc_real *values, const double *age, const double *dt, const double *counter,
+         const unsigned char *restarts, double *numbers, int *decisions)
 {{
     {name}_state s;
     int k, j;
@@ -173,7 +179,7 @@ void run(int n, const tc_real *values, const double *age, const double *dt, cons
                 s.slope[j] = before.slope[j];
             }}
         }}
-        {name}_step(&s, values + k * {channels}, age[k], dt[k]);
+        {name}_step_counted(&s, values + k * {channels}, age[k], dt[k], counter[k]);
         for (j = 0; j < {targets}; j++) {{ *decisions++ = s.status[j]; }}
         for (j = 0; j < {sensors}; j++) {{ *decisions++ = s.fault[j]; }}
         *decisions++ = s.rejected;
@@ -202,7 +208,9 @@ class CCode:
         """Run it from the start."""
         n = len(stream.dt)
         decisions, numbers = np.empty((n, self._width[0]), dtype=np.int32), np.empty((n, self._width[1]))
-        given = [np.ascontiguousarray(a) for a in (stream.values, stream.age, stream.dt, stream.restarts)]
+        given = [
+            np.ascontiguousarray(a) for a in (stream.values, stream.age, stream.dt, stream.counter, stream.restarts)
+        ]
         pointers = [ctypes.c_void_p(a.ctypes.data) for a in (*given, numbers, decisions)]
         self._library.run(n, *pointers)
         return Said(decisions.astype(np.int64), numbers)
@@ -219,7 +227,8 @@ class StructuredText:
         """Run it from the start."""
         self._machine.start()
         decisions, numbers, again = [], [], False
-        for values, age, dt, restarts in zip(stream.values, stream.age, stream.dt, stream.restarts, strict=True):
+        rows = (stream.values, stream.age, stream.dt, stream.counter, stream.restarts)
+        for values, age, dt, counter, restarts in zip(*rows, strict=True):
             again = bool(restarts)
             good = np.isfinite(values)
             given = {
@@ -227,6 +236,7 @@ class StructuredText:
                 "good": good.tolist(),
                 "age": stmachine.finite(age),
                 "elapsed": stmachine.finite(dt),
+                "reading": float(counter),
             }
             seen = self._machine.call(**given, restart=again)
             decisions.append(np.concatenate([np.ravel(getattr(seen, name)) for name in self._decisions]))

@@ -262,13 +262,14 @@ def finite(value: float) -> float:
 def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
     """Call a block with readings; what is not a number is not good."""
     said, told, found, passed = [], [], [], []
-    for values, age, dt in zip(*readings, strict=True):
+    for *values, age, dt, counter in readings.columns.tolist():
         good = [bool(np.isfinite(v)) for v in values]
         seen = machine.call(
             value=[float(v) if g else 0.0 for v, g in zip(values, good, strict=True)],
             good=good,
             age=finite(age),
             elapsed=finite(dt),
+            reading=counter,
             restart=False,
         )
         said.append([*seen.correction, *seen.slope])

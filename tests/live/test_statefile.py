@@ -28,6 +28,7 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.orders import order, rezero
 from thermocomp.runtime.state import Compensated, CompensatorState, Status, resume
 from thermocomp.virtual.datasets import record
@@ -165,7 +166,8 @@ def test_a_file_with_the_readings_of_the_zero_goes_on_as_without_a_restart() -> 
     state, done = go_on(machine, found, 5)
     references = {t: r._replace(why=whole.references[t].why) for t, r in state.references.items()}  # worded differently
     assert np.isnan(state.zeroed)
-    assert same(state._replace(references=references, zeroed=whole.zeroed), whole)
+    assert found.feed == FeedState()  # a file from before it existed
+    assert same(state._replace(references=references, zeroed=whole.zeroed, feed=whole.feed), whole)
     assert [d.corrections for d in done] == [d.corrections for d in without[5:]]
     assert done[-1].corrections["z_um"].offset != 0.0
 

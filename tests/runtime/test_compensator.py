@@ -105,7 +105,7 @@ def test_what_the_gate_turns_away_changes_nothing(value: float, channel: str) ->
         good[channel] = value if channel == "t" or not math.isfinite(value) else 1e9
     after, result = step([model()], OPEN, state, Reading(time, good), now)
     assert result.rejected
-    assert after._replace(clock=state.clock, idle=state.idle) == state
+    assert after._replace(clock=state.clock, idle=state.idle, feed=state.feed) == state
     assert result.corrections["z"] == state.corrections["z"]
 
 

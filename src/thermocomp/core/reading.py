@@ -17,6 +17,8 @@ class Reading:
         Channel name to value in house units: temperatures [degC], spindle speed [1/min].
     positions : mapping of str to float
         Axis letter to position [mm].
+    counter : float
+        Number that changes with each reading of the source; 0: the source does not count.
 
     Examples
     --------
@@ -29,6 +31,7 @@ class Reading:
     time: float
     values: Mapping[str, float]
     positions: Mapping[str, float] = field(default_factory=dict)
+    counter: float = 0.0
 
 
 class Measurement(NamedTuple):

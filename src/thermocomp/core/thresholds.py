@@ -28,6 +28,7 @@ def _fixed(value: float, unit: str, reason: str, source: str) -> float:
 
 
 _START, _WATCH, _PROBING, _OWN = "decision 0021", "decision 0030", "decision 0031", "choice of this project"
+_FEED = "decision 0046"
 _HEAT = "decision 0047"
 
 
@@ -96,6 +97,21 @@ class Thresholds:
         1800.0, "s", "while a speed is in doubt for less than this, no temperature is excluded in its place", _HEAT
     )
 
+    # repetition of all temperatures
+    repeat_factor: float = _fixed(
+        15.0, "intervals", "temperatures that repeat for this many usual intervals are not measured any more", _FEED
+    )
+    repeat_margin: float = _fixed(
+        3.0,
+        "",
+        "repetition is counted only if that is this many times the longest one on a sound machine",
+        _FEED,
+    )
+    repeat_wait: float = _fixed(3.0, "intervals", "between two updates of a source only predictions move", _FEED)
+    repeat_changes: float = _fixed(20.0, "changes", "number of changes after which an interval is usual", _FEED)
+    repeat_memory: float = _fixed(100.0, "changes", "number of changes over which the interval is averaged", _FEED)
+    repeat_moved: float = _fixed(3.0, "resolutions", "change of a prediction that a temperature must show", _FEED)
+
     # adaptation by probings
     offset_decay: float = _fixed(4 * 3600.0, "s", "an offset represents the present state of the machine", _PROBING)
     direction_decay: float = _fixed(
@@ -151,6 +167,11 @@ class Thresholds:
             raise SettingError(
                 f"thresholds: least_temperature = {self.least_temperature:g} degC must be below most_temperature = "
                 f"{self.most_temperature:g} degC"
+            )
+        if not 1.0 <= self.repeat_changes <= self.repeat_memory:
+            raise SettingError(
+                f"thresholds: repeat_changes = {self.repeat_changes:g} must be from 1 to repeat_memory = "
+                f"{self.repeat_memory:g}"
             )
         if not max(self.suspect, self.suspect_first) < self.implausible:
             raise SettingError(

@@ -50,6 +50,9 @@ class Watched:
         Longest constant reading while another one changes, above which the sensor is stuck; `GAP`: no time limit [s].
     unseen : float
         Cross-validation error (RMS) of the prediction, on left-out cycles [degC].
+    frozen : float
+        Change of the prediction, while all temperatures repeat, above which the source has stopped; 0: not known, as in
+        a file of an earlier version: `moved` instead [degC].
     """
 
     input: int
@@ -59,6 +62,7 @@ class Watched:
     moved: float
     still: float
     unseen: float
+    frozen: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,8 @@ class Watch:
         How soon the faults of each supervised speed are found.
     thresholds : Thresholds
         Those of the models that the watch belongs to.
+    repeats : float
+        Longest repetition of all temperatures in the recordings, in mean intervals between changes.
 
     Raises
     ------
@@ -104,6 +110,7 @@ class Watch:
     checks: tuple[HeatCheck, ...] = ()
     speed_faults: tuple[SpeedFault, ...] = ()
     thresholds: Thresholds = THRESHOLDS
+    repeats: float = 1.0
 
     def __post_init__(self) -> None:
         check_count("watch", INPUTS, inputs=self.inputs)
@@ -139,7 +146,9 @@ class Watch:
         check_between("watch", LEAST, RANGE, top_speed=self.top_speed)
         for name in ("off", "jump", "moved"):
             check_between("watch", LEAST, READING, **{name: [getattr(s, name) for s in self.sensors]})
-        check_between("watch", 0.0, READING, unseen=[s.unseen for s in self.sensors])
+        for name in ("unseen", "frozen"):
+            check_between("watch", 0.0, READING, **{name: [getattr(s, name) for s in self.sensors]})
+        check_between("watch", 1.0, READING, repeats=self.repeats)
         check_between("watch", LEAST, GAP, still=[s.still for s in self.sensors])
         self._check_speeds(lagged)
 
@@ -253,14 +262,15 @@ class Watch:
         return first, second
 
     def limits(self, what: str) -> FloatArray:
-        """Return one field of `Watched` for each sensor, (n_sensors,): off, jump, moved, still or unseen."""
+        """Return one field of `Watched` for each sensor, (n_sensors,): off, jump, moved, still, unseen or frozen."""
         return self._limits[what]
 
     @cached_property
     def _limits(self) -> dict[str, FloatArray]:
-        names = ("off", "jump", "moved", "still", "unseen")
+        names = ("off", "jump", "moved", "still", "unseen", "frozen")
         found = {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
         found["unseen"] = np.maximum(found["unseen"], self.thresholds.least_unseen)
+        found["frozen"] = np.where(found["frozen"] > 0.0, found["frozen"], found["moved"])
         return found
 
     @cached_property

@@ -40,8 +40,13 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         "temperatures: the sensor\nmonitoring rejects them.",
         "status": f"`{of}status[k]` is the state of a correction: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow "
         f"(computed, not applied).\n`{of}rejected` is the reason why a reading was not used: 0 it was used, 1 its "
-        "time, 2 a missing or implausible value,\n3 temperatures that do not fit the start of a machine. "
+        "time, 2 a missing or implausible value,\n3 temperatures that do not fit the start of a machine, 4 the source "
+        "has stopped: all temperatures\nrepeat, or the number of the reading does not change. "
         f"`{of}outside` is the number of inputs beyond the trained range.",
         "sensors": sensors,
+        "stopped": "A source that repeats its last values is found even if `age` is 0: each call with a valid age "
+        "counts as a\nreading, and the temperatures repeat for much longer than usual. The number of the reading is "
+        f"safer: if it has not\nchanged for {compensator.limits.reading_age:g} s, the values are too old; calls with "
+        "the same number count as one reading.",
         "hold": compensator.limits.hold,
     }

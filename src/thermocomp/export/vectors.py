@@ -35,6 +35,13 @@ class Readings(NamedTuple):
     values: FloatArray  #: (n_calls, n_channels), in the order of `Tables.channels`
     age: FloatArray  #: (n_calls,), age of the values [s]
     dt: FloatArray  #: (n_calls,), time since the previous call [s]
+    counter: FloatArray | None = None  #: (n_calls,), number of the reading; None: readings are not numbered
+
+    @property
+    def columns(self) -> FloatArray:
+        """Return values, age, time step and number of the reading, (n_calls, n_channels + 3)."""
+        counter = np.zeros(len(self.age)) if self.counter is None else self.counter
+        return np.column_stack([self.values, self.age, self.dt, counter])
 
 
 class Answers(NamedTuple):
@@ -58,11 +65,12 @@ def replay(
     """Replay readings through a compensator from its initial state and return its outputs."""
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = compensator.start(), 0.0, False, []
-    for values, age, dt in zip(*(a.tolist() for a in readings), strict=True):
+    for *values, age, dt, counter in readings.columns.tolist():
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
         tick = clock if good else math.nan  # an invalid clock advances nothing
-        state, said = compensator.step(state, Reading(tick - age, dict(zip(names, values, strict=True))), tick)
+        reading = Reading(tick - age, dict(zip(names, values, strict=True)), counter=counter)
+        state, said = compensator.step(state, reading, tick)
         if rounded is not None:
             corrections = {t: round_all(c, rounded) for t, c in state.corrections.items()}
             state = state._replace(models=round_all(state.models, rounded), corrections=corrections)
@@ -131,16 +139,17 @@ def make_readings(tables: Tables) -> Readings:
 
     A start at rest, with two impossible speeds, and a warm-up at changing speeds; each value missing, erratic or
     impossible for a while; late, old or out-of-order readings; a source that stops until the corrections have faded to
-    zero, and its return; sensors that stick, step and drift one after the other; values beyond the trained range.
+    zero, and its return; sensors that stick, step and drift one after the other; values beyond the trained range; a
+    source that repeats its values, and one whose counter does not advance.
     """
     machine, back = Warming(tables), tables.models[0].thresholds.return_time
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
-    rows: list[tuple[FloatArray, float, float]] = []
+    rows: list[tuple[FloatArray, float, float, float]] = []
 
-    def add(values: FloatArray, dt: float, old: float = 0.0) -> None:
+    def add(values: FloatArray, dt: float, old: float = 0.0, counter: float = 0.0) -> None:
         noise = np.where(machine.heat, 0.002 * rng.standard_normal(len(values)), 0.0)
-        rows.append((np.round(values + noise, 4), old, dt))
+        rows.append((np.round(values + noise, 4), old, dt, counter))
 
     for k in range(45):
         rest = machine.run(0.0, 10.0)
@@ -165,7 +174,7 @@ def make_readings(tables: Tables) -> Readings:
     held = math.ceil(min(max(hold / age, 1.0), 200.0))
     waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * math.ceil(min(3.0 * fade / age, 200.0))
     for dt in waits:
-        rows.append((rows[-1][0], rows[-1][1] + dt + age, dt))
+        rows.append((rows[-1][0], rows[-1][1] + dt + age, dt, 0.0))
         machine.run(0.0, dt)
     for share, dt in _THERE_AND_BACK:
         add(machine.run(share, dt), dt)
@@ -174,8 +183,12 @@ def make_readings(tables: Tables) -> Readings:
         add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
     add(machine.rest, 1e6)
     _turn(machine, add, 20)
-    values, ages, steps = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(3))
-    return Readings(values, ages, steps)
+    rows += [(rows[-1][0], 0.0, 20.0, 0.0)] * 20
+    _turn(machine, add, 5)
+    for k in range(12):
+        add(machine.run(0.8, age / 3), age / 3, counter=7.0 + max(k - 8, 0))
+    values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
+    return Readings(values, ages, steps, counters)
 
 
 #: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit

@@ -120,6 +120,10 @@ def watch_entry(watch: Watch) -> dict[str, Any]:
     """Return a watch as stored in a file."""
     entry = asdict(watch)
     del entry["thresholds"]  # stored once per file
+    if entry["repeats"] == 1.0 and not any(s["frozen"] for s in entry["sensors"]):
+        del entry["repeats"]  # as in a file from before these numbers
+        for sensor in entry["sensors"]:
+            del sensor["frozen"]
     return {k: v for k, v in entry.items() if v or k not in ("checks", "speed_faults")}
 
 

@@ -1,6 +1,7 @@
 """Construction of a service from its configuration."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.ports import Probe, Source
@@ -29,6 +30,8 @@ def build(settings: ServiceSettings) -> Service:
     else:
         models = [model for path in config.models for model in read_models(folder / path)]
         compensator = Compensator.of(models, config.limits, watching=config.shadow)
+    if any(getattr(one, "repeats", "watch") == "exception" for one in config.sources):
+        compensator = replace(compensator, repeats="exception")
     for one in config.sinks:
         if isinstance(one, LinuxCncOut) and (unknown := one.axes.keys() - compensator.lines.keys()):
             known = ", ".join(compensator.lines)

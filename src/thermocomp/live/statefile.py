@@ -20,6 +20,7 @@ from thermocomp.files.modelfile import entry_of, watch_entry
 from thermocomp.files.typed import decode, encode, want
 from thermocomp.live.storedzero import StateOfOthers, StoredZero, decode_zero, zero_of
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS, WatchState
 
@@ -211,6 +212,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         _check_averaged(begun, n, f"averaged.{k}")
     for k, (watch, seen, first) in enumerate(zip(compensator.watches, state.watches, cold.watches, strict=True)):
         _check_watch(seen, first, len(watch.inputs), f"watches.{k}")
+    _check_feed(state.feed, [w.predicted.shape for w in cold.watches])
     for target, learned in state.learned.items():
         place, n = f"learned.{target}", learned.mean.size
         _alike(learned.mean, (n,), f"{place}.mean")
@@ -255,6 +257,16 @@ def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> Non
     faults = np.append(seen.fault, seen.heat.fault)
     want(bool(((faults >= 0) & (faults < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
     _check_averaged(seen.averaged, n, f"{place}.averaged")
+
+
+def _check_feed(feed: FeedState, shapes: list[tuple[int, ...]]) -> None:
+    counts = (feed.repeated, feed.changes, feed.usual, feed.longest, feed.waited, *feed.steps)
+    want(all(0.0 <= v < math.inf for v in counts), None, "feed", "counts and times")
+    want(all(map(math.isfinite, (*feed.values, feed.counter))), None, "feed.values", "finite numbers")
+    want(len(feed.steps) == len(feed.values), len(feed.steps), "feed.steps", "one for each temperature")
+    want(not feed.predicted or len(feed.predicted) == len(shapes), None, "feed.predicted", "one for each watch")
+    for k, (found, shape) in enumerate(zip(feed.predicted, shapes, strict=False)):
+        _alike(found, shape, f"feed.predicted.{k}")
 
 
 def _check_averaged(averaged: ZeroMean, n: int, place: str) -> None:

@@ -78,6 +78,9 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
     sensors = []
     for place, k in enumerate(heat):
         limits = _limits(samples, change[:, k], predicted[:, place], folds, k, pace, wider)
+        _, moved, _ = _same(samples.values[:, heat], predicted[:, place], samples.time, folds)
+        worst = float(np.nanmax(np.abs(change[:, k] - predicted[:, place]), initial=0.0))
+        limits["frozen"] = max(THRESHOLDS.repeat_moved * _resolution(samples.values[:, k]), worst, SAFETY * moved)
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
         sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
     wider *= HEATED / SAFETY
@@ -92,6 +95,7 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         pace=pace,
         checks=checks,
         speed_faults=faults,
+        repeats=float(f"{_same(samples.values[:, heat], np.zeros(len(samples)), samples.time, folds)[2]:.4g}"),
     )
 
 
@@ -123,7 +127,7 @@ def _limits(
 ) -> dict[str, float]:
     """Return the limits of `Watched` for the temperature in a column."""
     off, values = change - predicted, samples.values[:, column]
-    still, moved = _same(values, predicted, samples.time, folds)
+    still, moved, _ = _same(values, predicted, samples.time, folds)
     return {
         "off": max(OFF, wider * float(np.nanmax(np.abs(off), initial=0.0))),
         "jump": max(JUMP, FASTEST * _jump(change, samples.time, folds, pace)),
@@ -165,12 +169,25 @@ def _resolution(values: FloatArray) -> float:
     return float(np.quantile(steps[steps > 0], 0.1)) if steps.any() else 0.0
 
 
-def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float]:
-    """Return the longest duration of constant readings of a sensor, and the change of its prediction meanwhile."""
-    new = np.append(True, (np.diff(values) != 0) | (np.diff(folds) != 0) | (np.diff(time) <= 0))
+def _same(values: FloatArray, predicted: FloatArray, time: FloatArray, folds: IntArray) -> tuple[float, float, float]:
+    """Return the longest repetition of the readings of a sensor, or of several in columns.
+
+    Returns
+    -------
+    duration : float
+        [s]
+    moved : float
+        Largest change of the prediction during a repetition [degC].
+    intervals : float
+        Longest repetition, in mean intervals between changes.
+    """
+    differ = np.diff(values.reshape(len(values), -1), axis=0).any(axis=1)
+    new = np.append(True, differ | (np.diff(folds) != 0) | (np.diff(time) <= 0))
     run = np.cumsum(new) - 1
     first = np.flatnonzero(new)
     known = (folds >= 0) & np.isfinite(predicted)
     longest = float((time - time[first[run]])[known].max(initial=0.0))
     moved = float(np.abs(predicted - predicted[first[run]])[known].max(initial=0.0))
-    return longest, moved
+    rows = np.bincount(run[folds >= 0])
+    rows = rows[rows > 0]
+    return longest, moved, float(rows.max() / rows.mean())

@@ -1,18 +1,20 @@
 """The compensator: one reading in, one correction per axis or target out; state in, state out.
 
-Processing chain of a reading: time check -> watch (which temperatures are trusted; substitutes) -> gate (complete,
-finite, plausible) -> minus the zero and `ErrorModel.step` per model -> offset and slope per axis -> minus sign ->
-limits -> `Correction`. Rejected readings leave the state unchanged: every correction is held for `Limits.hold` and
-fades after that; the same applies to a correction whose model was never judged without the failed sensors. The first
-readings after a start, while the spindle is stopped, are averaged to the zero of the temperatures, and the corrections
-remain zero until it is known (`ErrorModel.zeroing`). A probing arrives with a reading and takes effect from the next
-reading onwards: it measures the error of the models (`thermocomp.runtime.adaptation`).
+Processing chain of a reading: time check -> feed (does the source repeat its last values?) -> watch (which temperatures
+are trusted; substitutes) -> gate (complete, finite, plausible) -> minus the zero and `ErrorModel.step` per model ->
+offset and slope per axis -> minus sign -> limits -> `Correction`. Rejected readings leave the models unchanged: every
+correction is held for `Limits.hold` and fades after that; the same applies to a correction whose model was never judged
+without the failed sensors. The first readings after a start, while the spindle is stopped, are averaged to the zero of
+the temperatures, and the corrections remain zero until it is known (`ErrorModel.zeroing`). A probing arrives with a
+reading and takes effect from the next reading onwards: it measures the error of the models
+(`thermocomp.runtime.adaptation`).
 """
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +33,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.advance import Advanced, advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.driving import Driven, drive, rest, travel_time
+from thermocomp.runtime.feed import TemperatureFeed
 from thermocomp.runtime.gate import explain_implausible
 from thermocomp.runtime.geometry.straight import best_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
@@ -56,6 +59,8 @@ class Compensator:
         Lines by target or axis.
     watching : bool
         True: permit creation even if none of its targets may run, to observe their predictions.
+    repeats : {'watch', 'exception'}
+        'exception': the source reports changes only, so repeated temperatures do not mean that it has stopped.
 
     Raises
     ------
@@ -68,6 +73,7 @@ class Compensator:
     lines: dict[str, DeviationLine]
     limits: Limits = Limits()
     watching: bool = False
+    repeats: Literal["watch", "exception"] = "watch"
 
     @cached_property
     def watches(self) -> tuple[Watch, ...]:
@@ -86,6 +92,13 @@ class Compensator:
     @cached_property
     def _lookouts(self) -> tuple[Lookout, ...]:
         return tuple(Lookout(w) for w in self.watches)
+
+    @cached_property
+    def feed(self) -> TemperatureFeed:
+        """Temperatures of the models and watches, whose repetition is monitored."""
+        inputs = [i for m in self.models for i in m.inputs] + [i for w in self.watches for i in w.inputs]
+        heat = dict.fromkeys(i.name for i in inputs if i.quantity == "temperature")
+        return TemperatureFeed(tuple(heat) if self.repeats == "watch" else (), self.watches, self.thresholds)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -238,10 +251,10 @@ class Compensator:
             clock is set back, corrections wait until it has reached its previous time.
         """
         (fresh, known_before), tick = sift(state, probings), now if tick is None else tick
-        instant, untimely = place(state, reading, now, tick, self.limits, self.thresholds)
-        if not untimely:
-            state, reading = self._believe(state, reading, instant.time)
-        if why := untimely or self.gate(state, reading):
+        instant, why = place(state, reading, now, tick, self.limits, self.thresholds)
+        if not why:
+            state, reading, why = self._believe(state, reading, instant.time, tick)
+        if why := why or self.gate(state, reading):
             state, said = self.wait(state, tick, why)
             return state, said._replace(
                 refused=dict.fromkeys(probings or (), f"the reading to which the probing belongs is rejected: {why}")
@@ -350,8 +363,15 @@ class Compensator:
             refused={},
         )
 
-    def _believe(self, state: CompensatorState, reading: Reading, time: float) -> tuple[CompensatorState, Reading]:
-        """Return the reading with substitutes for temperatures that are not trusted."""
+    def _believe(
+        self, state: CompensatorState, reading: Reading, time: float, tick: float
+    ) -> tuple[CompensatorState, Reading, str]:
+        """Return the reading with substitutes for temperatures that are not trusted, and why the source has stopped."""
+        travel, age = travel_time(state, tick, self.limits), self.limits.reading_age
+        feed, why = self.feed.heed(state.feed, reading.values, reading.counter, travel, age)
+        state = state._replace(feed=feed)
+        if why:
+            return state, reading, why
         values, states = reading.values, list[WatchState]()
         for lookout, before in zip(self._lookouts, state.watches, strict=True):
             late = time + self.limits.reading_age
@@ -360,9 +380,10 @@ class Compensator:
                 before = begin(lookout.watch)  # noqa: PLW2901
             seen, values = lookout.believe(before, time, values)
             states.append(seen)
-        if values is reading.values:
-            return state, reading
-        return state._replace(watches=tuple(states)), Reading(reading.time, values, reading.positions)
+        if values is not reading.values:
+            reading = Reading(reading.time, values, reading.positions)
+        feed, why = self.feed.compare_predictions(feed, states)
+        return state._replace(watches=tuple(states), feed=feed), reading, why
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:

@@ -10,6 +10,7 @@ from thermocomp.core.state import State
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
+from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "no zero", "unknown", "first start"]
@@ -61,6 +62,7 @@ class CompensatorState(NamedTuple):
     probed: Mapping[str, dict[str, float]] = MappingProxyType({})
     zeroed: float = math.nan  #: stamp of the first reading of the zero; nan: unknown [s]
     because: str = ""  #: why corrections have to catch up; empty: because of the outage `away`
+    feed: FeedState = FeedState()  #: repetition of the temperatures
 
 
 class Compensated(NamedTuple):

@@ -321,7 +321,13 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
     s = s._replace(moving=moving)
     lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all are constant, as with a stopped logger
     long = same & calm & lives & (s.time - s.still > watch.limits("still"))
-    return s, (moves & (s.time - moving >= watch.thresholds.fault_duration)) | long
+    lasting = (s.time - moving >= watch.thresholds.fault_duration) & (_last_change(s, calm) > moving)
+    return s, (moves & lasting) | long
+
+
+def _last_change(s: WatchState, calm: BoolArray) -> FloatArray:
+    """Return when a temperature last changed, (..., 1): if all repeat, the source has stopped, and no sensor failed."""
+    return np.asarray(np.where(calm, s.still, -np.inf).max(axis=-1, keepdims=True, initial=-np.inf))
 
 
 def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
@@ -334,7 +340,8 @@ def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray
     beyond = (np.abs(z) > 1.0) & (s.time - recent > watch.thresholds.fault_rest)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
     with np.errstate(invalid="ignore"):
-        return s._replace(off=off), np.asarray((s.time - off >= watch.thresholds.fault_duration).any(axis=-1))
+        lasting = (s.time - off >= watch.thresholds.fault_duration) & (_last_change(s, calm) > off)
+        return s._replace(off=off), np.asarray(lasting.any(axis=-1))
 
 
 def _blame(

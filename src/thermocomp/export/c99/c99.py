@@ -28,9 +28,11 @@ extern "C" {{
 #ifdef TC_FLOAT
 #define {name}_start {name}_start_float
 #define {name}_step {name}_step_float
+#define {name}_step_counted {name}_step_counted_float
 #else
 #define {name}_start {name}_start_double
 #define {name}_step {name}_step_double
+#define {name}_step_counted {name}_step_counted_double
 #endif
 
 /* inputs, in this order */
@@ -56,6 +58,12 @@ void {name}_start({name}_state *s);
  * finally lets them decay to zero.
  */
 void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt);
+
+/*
+ * The same with the number of the reading: it changes with each new reading, from 1, and the values are too old if it
+ * does not, whatever their age. 0: they are not numbered.
+ */
+void {name}_step_counted({name}_state *s, const tc_real value[{n}], double age, double dt, double reading);
 
 #ifdef __cplusplus
 }}
@@ -103,6 +111,11 @@ void {name}_start({name}_state *s)
 
 void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt)
 {{
+    {name}_step_counted(s, value, age, dt, 0.0);
+}}
+
+void {name}_step_counted({name}_state *s, const tc_real value[{n}], double age, double dt, double reading)
+{{
     {name}_work w;
     int k;
 
@@ -111,6 +124,7 @@ void {name}_step({name}_state *s, const tc_real value[{n}], double age, double d
     }}
     w.age = age;
     w.dt = dt;
+    w.counter = reading;
     tc_step(s, &w);
 }}
 """
@@ -143,7 +157,7 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
         facts=above,
         name=name,
         n=n,
-        work=write_variables(sizes, "w", functions + "w->value w->age w->dt"),
+        work=write_variables(sizes, "w", functions + "w->value w->age w->dt w->counter"),
         constants=write_tables(tables, functions),
         functions=functions,
     )

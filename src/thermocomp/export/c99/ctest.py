@@ -20,8 +20,8 @@ _PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
 
-/* values, their age [s], time since the previous call [s] */
-static const double given[CALLS][INPUTS + 2] = {{
+/* values, their age [s], time since the previous call [s], number of the reading */
+static const double given[CALLS][INPUTS + 3] = {{
 {given}
 }};
 
@@ -57,7 +57,7 @@ int main(void)
         for (j = 0; j < INPUTS; j++) {{
             value[j] = (tc_real)given[k][j];
         }}
-        {name}_step(&s, value, given[k][INPUTS], given[k][INPUTS + 1]);
+        {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
         wrong = (s.rejected == 0) != told[k][TARGETS + SENSORS];
         for (j = 0; j < TARGETS; j++) {{
             wrong |= off((double)s.correction[j], wanted[k][2 * j]);
@@ -100,7 +100,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         inputs=len(tables.channels),
         targets=len(tables.targets),
         sensors=len(tables.sensors),
-        given=_rows([*readings.values[k].tolist(), readings.age[k], readings.dt[k]] for k in calls),
+        given=_rows(readings.columns.tolist()),
         wanted=_rows(
             [x for pair in zip(answers.correction[k], answers.slope[k], strict=True) for x in pair] for k in calls
         ),

@@ -47,8 +47,11 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
     for (;;) {{                                 /* every dt seconds */
         /* fill value[] as below; NAN for a sensor without a reading */
         {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
+        /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
         /* send state.correction[0] to the controller [um] */
     }}
+
+{stopped}
 
 | value | meaning | unit |
 |---|---|---|

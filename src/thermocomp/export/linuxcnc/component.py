@@ -27,7 +27,8 @@ pin in bit teleop-mode;
 pin out float correction-#[{targets}];  /* [mm] */
 pin out float slope-#[{targets}];       /* [um/m] */
 pin out s32 status-#[{targets}];        /* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow */
-{faults}pin out s32 rejected;            /* reason why a reading was not used: 0 used, 1 time, 2 value, 3 not a start */
+{faults}/* why a reading was not used: 0 it was used, 1 its time, 2 a value, 3 not a start, 4 the source has stopped */
+pin out s32 rejected;
 pin out s32 outside;             /* number of inputs beyond the trained range */
 pin out float scale = {resolution!r};     /* one count of an external offset [machine units] */
 pin out bit engaged;             /* external offsets can move */

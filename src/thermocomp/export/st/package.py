@@ -53,7 +53,10 @@ Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds.
 | `good[k]` | FALSE for a sensor without a reading or with a reported failure |
 | `age` | time since the values were measured [s] |
 | `elapsed` | time since the previous call, measured or the cycle time of the task [s] |
+| `reading` | optional: number of the reading, which changes with each new one, from 1; 0: they are not numbered |
 | `restart` | rising edge: the present temperatures become the zero; the corrections continue without a jump |
+
+{stopped}
 
 | value | meaning | unit |
 |---|---|---|

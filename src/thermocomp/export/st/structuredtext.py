@@ -47,6 +47,7 @@ FOR {k} := 0 TO {last} DO
 END_FOR;
 {w}.age := {age};
 {w}.{w_dt} := {elapsed};
+{w}.counter := {reading};
 {step}({bags});
 """
 
@@ -84,7 +85,7 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     scl = dialect == "scl"
     functions = write_functions(tables, name, dialect)
     used = "\n".join(statements for _, statements in functions.values())
-    used += " ".join([*(f" s.{safe(n)}" for n in OUTPUTS), f"w.value w.age w.{safe('dt')} t.rate"])
+    used += " ".join([*(f" s.{safe(n)}" for n in OUTPUTS), f"w.value w.age w.{safe('dt')} w.counter t.rate"])
     if scl:
         used = used.replace("#", "")
     units = [SourceUnit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
@@ -132,6 +133,7 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
                 "good": f"{array('bool', n)} := [{', '.join(['TRUE'] * n)}]",
                 "age": "LREAL",
                 "elapsed": "LREAL",
+                "reading": "LREAL",
                 "restart": "BOOL",
             },
         ),
@@ -142,7 +144,7 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
         section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, "restarted": "BOOL"}),
         section("VAR_TEMP" if scl else "VAR", {"k": "DINT"}),
     ]
-    names = ("s", "w", "k", "value", "good", "age", "elapsed", "restart", "restarted")
+    names = ("s", "w", "k", "value", "good", "age", "elapsed", "reading", "restart", "restarted")
     body = _BODY.format(
         **{v: f"{mark}{v}" for v in names if v != "s"},
         s=f"s := {mark}s",

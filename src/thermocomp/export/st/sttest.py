@@ -3,8 +3,6 @@
 import math
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
 from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, section, values, wrapped
 from thermocomp.export.vectors import Answers, Readings, find_tolerance
@@ -20,7 +18,8 @@ _BODY = """IF NOT {_}done THEN
         {_}good[{_}j] := {_}value[{_}j] < 1.0E+30;
     END_FOR;
     {_}tested(value := {_}value, good := {_}good, age := {_}v.given[{_}row * {width} + {inputs}],
-        elapsed := {_}v.given[{_}row * {width} + {inputs} + 1], restart := FALSE);
+        elapsed := {_}v.given[{_}row * {width} + {inputs} + 1],
+        reading := {_}v.given[{_}row * {width} + {inputs} + 2], restart := FALSE);
     {_}off := (({_}tested.rejected = 0) <> {_}v.used[{_}row]);
     FOR {_}j := 0 TO {last_target} DO
         {_}want := {_}v.wanted[{_}row * {targets} + {_}j];
@@ -58,7 +57,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
     targets, sensors = len(tables.targets), len(tables.sensors)
     mark = "#" if scl else ""
     held: dict[str, tuple[Kind, Sequence[float]]] = {
-        "given": ("real", _finite(np.column_stack([readings.values, readings.age, readings.dt]).ravel())),
+        "given": ("real", _finite(readings.columns.ravel())),
         "wanted": ("real", answers.correction.ravel().tolist()),
         "told": ("int", answers.status.ravel().tolist()),
         "used": ("bool", answers.passed.tolist()),
@@ -95,7 +94,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
     sizes = {
         "_": mark,
         "inputs": inputs,
-        "width": inputs + 2,
+        "width": inputs + 3,
         "last": inputs - 1,
         "targets": targets,
         "last_target": targets - 1,

@@ -18,6 +18,7 @@ from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.inbox import Inbox
 from thermocomp.live.adapters.messages import read_corrections, read_message, write_message
+from thermocomp.live.adapters.reportedchanges import ReportedChanges
 
 
 @dataclass(kw_only=True)
@@ -88,12 +89,17 @@ class MqttSource(Broker):
     ----------
     names : dict of str to str
         Channel by the name in the message.
+    counter : str
+        Channel that shows whether unchanged values are still measured, if only changes are published; empty: each
+        message is a reading.
     """
 
     names: dict[str, str] = field(default_factory=dict)
+    counter: str = ""
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
     _inbox: Inbox | None = field(default=None, init=False, repr=False)
+    _changes: ReportedChanges | None = field(default=None, init=False, repr=False)
 
     @property
     def replaced(self) -> int:
@@ -104,6 +110,7 @@ class MqttSource(Broker):
         """Return a queue that hands over each message on arrival: in a queue its age would be unknown."""
         inbox, receive = Inbox(), self._receive
         self._inbox = inbox
+        self._changes = ReportedChanges(self.counter) if self.counter else None
 
         class Door(asyncio.Queue[aiomqtt.Message]):
             def put_nowait(self, item: aiomqtt.Message) -> None:
@@ -118,14 +125,17 @@ class MqttSource(Broker):
         except ReadingError as e:
             self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
             return
-        if reading.time >= 0.0:
+        if message.retain and self._changes is not None:
+            self._changes.keep(reading.values)
+        elif reading.time >= 0.0:
             inbox.put(reading)
 
     async def readings(self) -> AsyncIterator[Reading]:
         """Return readings as they arrive, until the connection to the broker is lost.
 
         A message without time is stamped when it arrives. If messages arrive faster than they are processed, the newest
-        value of each channel is used. A message retained by the broker is used only if it contains its time.
+        value of each channel is used. A message retained by the broker is used only if it contains its time, or
+        as a value of a source that publishes changes only.
         """
         client, inbox = self._connected(), self._inbox
         assert inbox is not None
@@ -136,7 +146,9 @@ class MqttSource(Broker):
             try:
                 while not inbox.closed:
                     for reading in await inbox.take():
-                        yield reading
+                        whole = self._changes.complete(reading) if self._changes else reading
+                        if whole.values:
+                            yield whole
                 await lost
             finally:
                 lost.cancel()

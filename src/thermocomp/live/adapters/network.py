@@ -62,14 +62,25 @@ class MqttIn(OnBroker):
         Channel by the name in the message, for names that differ.
     virtual : bool
         The publisher is a virtual machine, which may run faster than real time (`Config.speed`).
+    repeats : {'watch', 'exception'}
+        'exception': only changes are published, and `counter` shows that unchanged values are still measured.
+    counter : str
+        Name in the messages of a number that changes with each one, or with each heartbeat.
     """
 
     kind: Literal["mqtt"]
     names: Names = field(default_factory=dict)
     virtual: bool = False
+    repeats: Literal["watch", "exception"] = "watch"
+    counter: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if bool(self.counter) != (self.repeats == "exception"):
+            raise SettingError(
+                f'repeats = "{self.repeats}", counter = {self.counter!r}: a source that publishes changes only '
+                '(repeats = "exception") needs the name of a counter, and no other source has one'
+            )
         if twice := [name for name, count in Counter(self.names.values()).items() if count > 1]:
             raise SettingError(
                 f"names: several entries name the channel {', '.join(sorted(twice))}: keep one entry for each channel"
@@ -79,7 +90,8 @@ class MqttIn(OnBroker):
         """Create the source; it connects later."""
         from thermocomp.live.adapters.mqtt import MqttSource
 
-        return MqttSource(topic=self.topic, host=self.host, port=self.port, names=dict(self.names))
+        of = {"topic": self.topic, "host": self.host, "counter": self.names.get(self.counter, self.counter)}
+        return MqttSource(**of, port=self.port, names=dict(self.names))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ numbers only.
 """
 
 from thermocomp.core.bounds import GAP
-from thermocomp.runtime.program import watching
+from thermocomp.runtime.program import feeding, watching
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
 from thermocomp.runtime.program.language import (
@@ -37,8 +37,12 @@ def step(s: Kept, w: Work, t: Constants) -> None:
     w.stands = False
     with when(t.has_speed):
         w.stands = w.given[t.speed_channel] & (abs(w.value[t.speed_channel]) <= t.stopped_speed)
+    with when(w.passes):
+        feeding.heed(s, w, t)
     with when(t.watched), when(w.passes):
         watching.believe(s, w, t)
+        with when(t.has_feed):
+            feeding.compare_predictions(s, w, t)
     with when(w.passes):
         check(s, w, t)
     with when(w.passes):

@@ -18,6 +18,18 @@ from thermocomp.runtime.program.tree import Function
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
+#: thresholds of the gate and of the feed
+OF_GATE = (
+    "stopped_speed",
+    "clock_skew",
+    "zero_change",
+    "repeat_factor",
+    "repeat_margin",
+    "repeat_wait",
+    "repeat_changes",
+    "repeat_memory",
+    "repeat_moved",
+)
 #: thresholds that only the watch needs, and those it has in common with the gate
 OF_WATCH = (
     "least_temperature",
@@ -91,12 +103,12 @@ def gather(compensator: Compensator) -> Tables:
         "at_rest": zeroing.at_rest,
         "otherwise": zeroing.otherwise,
         "speed_channel": place.get(zeroing.speed, 0),
-        **{name: getattr(thresholds, name) for name in ("stopped_speed", "clock_skew", "zero_change")},
         **_ranges(ranges, models, place, thresholds),
         "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
         "set_range": [ranges.index(i) for s in sets for i in s],
         "model_rezeroed": [any(i.rezero for i in m.inputs) for m in models],
         **_lines(compensator),
+        **_feed(compensator, place),
         **_judged(models, sensors),
         **_watch(watch, place),
     }
@@ -145,6 +157,8 @@ def _sizes(values: dict[str, Any]) -> dict[str, int]:
         "SETS": len(values["set_begin"]) - 1,
         "ENDS_OF_SETS": len(values["set_begin"]),
         "MEMBERS": len(values["set_range"]),
+        "FED": len(values["feed_channel"]),
+        "has_feed": int(bool(values["feed_channel"])),
         "JUDGED": len(values["judged_model"]),
         "has_zero": int(any(values["model_rezeroed"])),
         "has_absolute": int(not all(values["model_rezeroed"])),
@@ -173,6 +187,7 @@ def _ranges(
             bounds[i].append((a, b))
     at_once = {i for m in models if not any(i.rezero for i in m.inputs) for i in m.inputs}
     return {
+        **{name: getattr(thresholds, name) for name in OF_GATE},
         "channel": [place[r.name] for r in ranges],
         "temperature": heat,
         "rezero": [r.rezero for r in ranges],
@@ -203,6 +218,16 @@ def _lines(compensator: Compensator) -> dict[str, Any]:
         "travel_low": [low for low, _ in travels],
         "travel_high": [high for _, high in travels],
         "shadow": [t in compensator.shadow for t in compensator.lines],
+    }
+
+
+def _feed(compensator: Compensator, place: dict[str, int]) -> dict[str, Any]:
+    """Return the temperatures whose repetition is monitored, and the place of each watched one among them."""
+    feed = compensator.feed
+    return {
+        "feed_channel": [place[name] for name in feed.names],
+        "feed_place": feed.places[0] if feed.places else [0 for w in compensator.watches for _ in w.sensors],
+        "may_count": feed.counts,
     }
 
 
@@ -299,7 +324,7 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "gain": bank.gain.tolist(),
         "direct": direct.tolist(),
         "weight": weight.tolist(),
-        **{f"{name}_limit": watch.limits(name).tolist() for name in ("jump", "moved", "still")},
+        **{f"{name}_limit": watch.limits(name).tolist() for name in ("jump", "moved", "frozen", "still")},
         "off_limit": [*watch.limits("off").tolist(), *heats.off.tolist()],
         "unseen": unseen.tolist(),
         "shape": (watch.signatures / unseen[:, None]).tolist(),

@@ -235,17 +235,22 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
         w.changed[i] = ~same
         with when(w.calm[i] & w.changed[i]):
             lives.set(True)
+    w.last_change = -1e30
+    for i in each("i", t.SENSORS):
+        with when(w.changed[i]):
+            s.still[i] = w.now
+        with when(w.calm[i] & (s.still[i] > w.last_change)):
+            w.last_change = s.still[i]
     for i in each("i", t.SENSORS):
         moves = let("moves", ~w.changed[i] & w.calm[i] & (abs(s.predicted[i] - s.then_predicted[i]) > t.moved_limit[i]))
         with when(w.changed[i]):
             s.read_once[i] = w.there[i]
             s.same[i] = w.x[i]
-            s.still[i] = w.now
             s.then_predicted[i] = s.predicted[i]
         with when(moves & ~s.is_moving[i]):
             s.moving[i] = w.now
         s.is_moving[i] = moves
-        w.stuck[i] = moves & (w.now - s.moving[i] >= t.fault_duration)
+        w.stuck[i] = moves & (w.now - s.moving[i] >= t.fault_duration) & (w.last_change > s.moving[i])
         with when(~w.changed[i] & w.calm[i] & lives & (w.now - s.still[i] > t.still_limit[i])):
             w.stuck[i] = True
 
@@ -279,7 +284,7 @@ def find_off(s: Kept, w: Work, t: Constants) -> None:
         with when(beyond & ~s.is_off[i]):
             s.off_since[i] = w.now
         s.is_off[i] = beyond
-        with when(beyond & (w.now - s.off_since[i] >= t.fault_duration)):
+        with when(beyond & (w.now - s.off_since[i] >= t.fault_duration) & (w.last_change > s.off_since[i])):
             w.lasting = True
 
 
