@@ -67,8 +67,8 @@ def check(
         (memory,) = memories
         for name in ("predicted", "usual", "memory", "traces"):
             np.testing.assert_allclose(memory.find("s", name), getattr(state, name), rtol=1e-10, atol=1e-10)
-        for name, kept in (("heat", "heat"), ("stored", "stored"), ("estimate", "estimate"), ("states", "estimated")):
-            np.testing.assert_allclose(memory.find("s", kept), getattr(state.heat, name), rtol=1e-9, atol=1e-10)
+        for name, own in (("heat", "heat"), ("stored", "stored"), ("estimate", "estimate"), ("states", "estimated")):
+            np.testing.assert_allclose(memory.find("s", own), getattr(state.heat, name), rtol=1e-9, atol=1e-10)
         cleared = memory.find("s", "cleared") != 0
         assert cleared.tolist() == np.isneginf(state.evidence).tolist()
         found = memory.find("s", "evidence")[~cleared]

@@ -221,7 +221,7 @@ class Watch:
         """Error of each estimate of a heat if a substitute is wrong by its limit, (n_sensors, n_checks)."""
         direct, lagged = self.heat_read_out
         settled = direct + lagged.reshape(len(self.time_constants), *direct.shape).sum(axis=0)
-        return np.maximum(np.abs(direct), np.abs(settled)) * self.limits("off")[:, None]
+        return np.asarray(np.maximum(np.abs(direct), np.abs(settled)) * self.limits("off")[:, None])
 
     @cached_property
     def heat_constants(self) -> HeatConstants:

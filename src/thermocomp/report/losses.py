@@ -26,7 +26,7 @@ def describe_losses(models: Sequence[ErrorModel]) -> Iterator[str]:
             )
         if gone := [n for n in single if n not in stood]:
             said.append(f"without {', '.join(gone)} the correction is held, then fades")
-        heat = [n for n in single if n in watch.failing]
+        heat = [n for n in single if n in watch.names]
         dear |= dict.fromkeys(n for n in heat if n not in stood or single[n] > DEAR * found.rms)
         yield f"{model.target}: {found.rms:.2f} {model.unit} RMS on unseen cycles; {'; '.join(said)}"
     if dear:

@@ -122,13 +122,19 @@ def residuals(watch: Watch, state: HeatState) -> FloatArray:
     return np.where(trusted, state.heat - state.estimate, 0.0)
 
 
-def find_lasting(watch: Watch, state: HeatState, time: float) -> tuple[HeatState, BoolArray]:
-    """Return the speeds, (..., n_speeds), whose heat has differed from its estimate for too long."""
+def find_lasting(watch: Watch, state: HeatState, time: float, last_change: FloatArray) -> tuple[HeatState, BoolArray]:
+    """Return the speeds, (..., n_speeds), whose heat has differed from its estimate for too long.
+
+    Parameters
+    ----------
+    last_change : ndarray of shape (..., 1)
+        Time at which a temperature last changed: if all repeat, the source has stopped [s].
+    """
     apart = np.abs(residuals(watch, state))
     since = _begin(state.since, apart > limits(watch, state), time)
     doubt = _begin(state.doubt, apart > watch.heat_constants.off + state.reach, time)
     with np.errstate(invalid="ignore"):
-        lasting = time - since >= watch.thresholds.fault_duration
+        lasting = (time - since >= watch.thresholds.fault_duration) & (last_change > since)
     of = watch.heat_constants.speeds
     speeds = [lasting[..., of == k].any(axis=-1) for k in range(len(watch.speeds))]
     return state._replace(since=since, doubt=doubt), np.stack(speeds, axis=-1)

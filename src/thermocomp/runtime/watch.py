@@ -248,13 +248,15 @@ def _step(
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
     s, stuck = _stuck(watch, s, x, calm)
-    s, wrong = _check_speeds(watch, s, speeds, dt)
+    s, wrong = _check_speeds(watch, s, speeds, calm, dt)
     s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
     s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting, wrong))
     return _returns(watch, s, difference)
 
 
-def _check_speeds(watch: Watch, s: WatchState, speeds: FloatArray, dt: float) -> tuple[WatchState, BoolArray]:
+def _check_speeds(
+    watch: Watch, s: WatchState, speeds: FloatArray, calm: BoolArray, dt: float
+) -> tuple[WatchState, BoolArray]:
     """Compare the heats of the speeds with their estimates; return the speeds that have been wrong for too long."""
     if not watch.checks:
         return s, np.zeros(speeds.shape, dtype=np.bool_)
@@ -262,7 +264,7 @@ def _check_speeds(watch: Watch, s: WatchState, speeds: FloatArray, dt: float) ->
     found = heat.advance(
         watch, heat.lose(s.heat, s.time, lost), speeds, s.used, s.memory[..., :lags], s.fault != GOOD, dt
     )
-    found, wrong = heat.find_lasting(watch, found, s.time)
+    found, wrong = heat.find_lasting(watch, found, s.time, _last_change(s, calm))
     return s._replace(heat=heat.trust_again(watch, found, s.time, lost)), wrong
 
 

@@ -84,7 +84,8 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         with when(is_wrong & ~s.is_wrong[c]):
             s.wrong_since[c] = w.now
         s.is_wrong[c] = is_wrong
-        with when(is_wrong & (w.now - s.wrong_since[c] >= t.fault_duration)):
+        lasts = let("lasts", w.now - s.wrong_since[c] >= t.fault_duration)
+        with when(is_wrong & lasts & (w.last_change > s.wrong_since[c])):
             w.wrong[p] = True
         is_doubtful = let("is_doubtful", trusted & (abs(apart) > least))
         with when(is_doubtful & ~s.is_doubtful[c]):
