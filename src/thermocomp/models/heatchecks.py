@@ -69,6 +69,8 @@ def find_checks(
     relative = rms / np.maximum(heats[judged].std(axis=0), 1e-9)
     checks, faults = list[HeatCheck](), list[SpeedFault]()
     for k, speed in enumerate(speeds):
+        if not share[judged, k].any():  # it never turned: nothing is known about its heat
+            continue
         first = k * (1 + len(POWERS))
         best = first + 1 + int(np.argmin(relative[first + 1 : first + 1 + len(POWERS)]))
         kept = [c for c in (first, best) if wider * largest[c] < BLIND]

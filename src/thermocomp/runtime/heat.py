@@ -18,8 +18,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
-#: a missing speed, as in `thermocomp.runtime.watch.WORDS`
-MISSING = 1
+#: faults of a speed, as in `thermocomp.runtime.watch.WORDS`
+GOOD, MISSING, OFF = 0, 1, 4
 
 _EMPTY: FloatArray = np.empty(0)
 
@@ -81,10 +81,24 @@ def find_speeds(watch: Watch, state: HeatState, read: FloatArray) -> FloatArray:
     return found
 
 
-def advance(
-    watch: Watch, state: HeatState, read: FloatArray, used: FloatArray, lags: FloatArray, failed: BoolArray, dt: float
-) -> HeatState:
-    """Advance heats, their estimates and the speed states.
+def trust(watch: Watch, state: HeatState, read: FloatArray, lost: BoolArray) -> FloatArray:
+    """Return speeds as read, (..., n_speeds), with substitutes for those that are missing or not trusted."""
+    if not watch.checks or not (replaced := lost | (state.fault != GOOD)).any():
+        return read
+    return np.where(replaced, find_speeds(watch, state, read), read)
+
+
+def check(
+    watch: Watch,
+    state: HeatState,
+    read: FloatArray,
+    used: FloatArray,
+    memory: FloatArray,
+    times: tuple[float, float],
+    failed: BoolArray,
+    last_change: FloatArray,
+) -> tuple[HeatState, BoolArray]:
+    """Return the next state, and the speeds, (..., n_speeds), that have been wrong for too long.
 
     Parameters
     ----------
@@ -92,11 +106,39 @@ def advance(
         Speeds as read; nan if missing [1/min].
     used : ndarray of shape (..., n_sensors)
         Temperatures minus their reference, with substitutes [degC].
-    lags : ndarray of shape (..., n_lags)
-        Lags of the temperatures.
+    memory : ndarray of shape (..., n_memory)
+        See `thermocomp.runtime.watch.WatchState`.
+    times : tuple of float
+        Time, and time since the last check [s].
     failed : ndarray of bool of shape (..., n_sensors)
         Temperatures with substitutes.
+    last_change : ndarray of shape (..., 1)
+        Time at which a temperature last changed: if all repeat, the source has stopped [s].
     """
+    if not watch.checks:
+        return state, np.zeros(read.shape, dtype=np.bool_)
+    (time, dt), lost, lags = times, np.isnan(read), memory.shape[-1] - len(watch.states)
+    new = lost & (state.fault == GOOD)
+    fault = np.where(new, MISSING, state.fault).astype(np.int8)
+    state = state._replace(
+        fault=fault, gone=np.where(new, time, state.gone), reach=failed.astype(np.float64) @ watch.heat_reach
+    )
+    state = advance(watch, state, read, used, memory[..., :lags], dt)
+    state, wrong = find_lasting(watch, state, time, last_change)
+    return trust_again(watch, state, time, lost), wrong
+
+
+def fail(watch: Watch, state: HeatState, memory: FloatArray, wrong: BoolArray) -> tuple[HeatState, FloatArray]:
+    """Exclude wrong speeds, (..., n_speeds); their states become those of the speeds that explain the temperatures."""
+    changed, lags = memory.copy(), memory.shape[-1] - len(watch.states)
+    changed[..., lags:] = np.where(wrong.take(watch.state_speeds, axis=-1), state.states, memory[..., lags:])
+    return state._replace(fault=np.where(wrong, OFF, state.fault).astype(np.int8)), changed
+
+
+def advance(
+    watch: Watch, state: HeatState, read: FloatArray, used: FloatArray, lags: FloatArray, dt: float
+) -> HeatState:
+    """Advance heats, their estimates and the speed states; see `check`."""
     direct, lagged = watch.heat_read_out
     estimate = used @ direct + lags @ lagged
     found = find_speeds(watch, state._replace(estimate=estimate), read)
@@ -107,7 +149,7 @@ def advance(
     share = np.minimum(np.abs(found.take(watch.state_speeds, axis=-1)) / bank.top, watch.thresholds.heat_factor)
     rates = bank.rates[lag:] + share * bank.gain
     states = lagbank.follow(state.states, share**bank.powers, dt * rates)
-    return state._replace(heat=heat, stored=stored, estimate=estimate, reach=failed @ watch.heat_reach, states=states)
+    return state._replace(heat=heat, stored=stored, estimate=estimate, states=states)
 
 
 def limits(watch: Watch, state: HeatState) -> FloatArray:
@@ -118,18 +160,12 @@ def limits(watch: Watch, state: HeatState) -> FloatArray:
 
 def residuals(watch: Watch, state: HeatState) -> FloatArray:
     """Return the difference of each heat from its estimate, (..., n_checks); 0 for a speed that is not trusted."""
-    trusted = state.fault.take(watch.heat_constants.speeds, axis=-1) == 0
+    trusted = state.fault.take(watch.heat_constants.speeds, axis=-1) == GOOD
     return np.where(trusted, state.heat - state.estimate, 0.0)
 
 
 def find_lasting(watch: Watch, state: HeatState, time: float, last_change: FloatArray) -> tuple[HeatState, BoolArray]:
-    """Return the speeds, (..., n_speeds), whose heat has differed from its estimate for too long.
-
-    Parameters
-    ----------
-    last_change : ndarray of shape (..., 1)
-        Time at which a temperature last changed: if all repeat, the source has stopped [s].
-    """
+    """Return the speeds, (..., n_speeds), whose heat has differed from its estimate for too long; see `check`."""
     apart = np.abs(residuals(watch, state))
     since = _begin(state.since, apart > limits(watch, state), time)
     doubt = _begin(state.doubt, apart > watch.heat_constants.off + state.reach, time)
@@ -151,13 +187,6 @@ def in_doubt(watch: Watch, state: HeatState, time: float) -> BoolArray:
         return np.asarray((time - state.doubt < watch.thresholds.speed_doubt).any(axis=-1))
 
 
-def lose(state: HeatState, time: float, lost: BoolArray) -> HeatState:
-    """Return the state with missing speeds, (..., n_speeds), not trusted."""
-    new = lost & (state.fault == 0)
-    fault = np.where(new, MISSING, state.fault).astype(np.int8)
-    return state._replace(fault=fault, gone=np.where(new, time, state.gone))
-
-
 def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray) -> HeatState:
     """Trust a missing speed again once it has agreed with the temperatures for as long as it was missing."""
     far = np.abs(state.heat - state.estimate) > limits(watch, state)
@@ -167,4 +196,4 @@ def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray) ->
     back = _begin(state.back, fits, time)
     with np.errstate(invalid="ignore"):
         again = fits & (time - back >= np.minimum(back - state.gone, watch.thresholds.return_time))
-    return state._replace(fault=np.where(again, 0, state.fault).astype(np.int8), back=np.where(again, np.nan, back))
+    return state._replace(fault=np.where(again, GOOD, state.fault).astype(np.int8), back=np.where(again, np.nan, back))

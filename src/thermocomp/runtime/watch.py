@@ -18,6 +18,7 @@ from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime import heat
 from thermocomp.runtime.blame import find_limits, one_fails, speeds_fail, weigh_swaps
 from thermocomp.runtime.heat import HeatState
+from thermocomp.runtime.plausible import is_plausible, replace_first
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -132,47 +133,22 @@ def look(
     if (lost & ((watch.deciding < 0) | np.isnan(state.time))).any():
         return state, believed
     if np.isnan(state.time):
-        believed[..., temperatures] = _made_up(watch, values[..., temperatures])
+        believed[..., temperatures] = replace_first(watch, values[..., temperatures])
         return _start(watch, state, time, believed, resting), believed
     zero = state.reference.take(temperatures, axis=-1)
     read = values.take(temperatures, axis=-1)
     x = read - zero
-    missing = ~_plausible(watch, x, read)
+    missing = ~is_plausible(watch, x, read)
     if (lost.any(axis=-1) & missing.all(axis=-1)).any():
         return state, believed  # there is no reading at all
-    believed[..., watch.speeds] = _trusted(watch, state, speeds, lost)
+    believed[..., watch.speeds] = heat.trust(watch, state.heat, speeds, lost)
     if time - state.time >= watch.thresholds.check_interval:
         known = np.where(lost, np.nan, speeds)
         state = _step(watch, state, time, np.where(missing, np.nan, x), believed, known)
-        believed[..., watch.speeds] = _trusted(watch, state, speeds, lost)
+        believed[..., watch.speeds] = heat.trust(watch, state.heat, speeds, lost)
     if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
         believed[..., temperatures] = np.where(replaced, zero + state.used, read)
     return state, believed
-
-
-def _trusted(watch: Watch, state: WatchState, speeds: FloatArray, lost: BoolArray) -> FloatArray:
-    """Return the speeds, (..., n_speeds), with substitutes for those that are not trusted."""
-    if not watch.checks or not (replaced := lost | (state.heat.fault != GOOD)).any():
-        return speeds
-    return np.where(replaced, heat.find_speeds(watch, state.heat, speeds), speeds)
-
-
-def _made_up(watch: Watch, values: FloatArray) -> FloatArray:
-    """Return the first readings; an implausible one gets the others' median offset from the zero of the training.
-
-    Plausible readings are those that the gate of the compensator accepts at a start.
-    """
-    zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
-    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
-    span = np.maximum(width, watch.thresholds.least_margin)
-    least, most = watch.thresholds.plausible["temperature"]
-    with np.errstate(all="ignore"):
-        offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
-        middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
-        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan is sorted last
-        fits = np.abs(offset - day) <= span
-    most_day = watch.thresholds.zero_change
-    return np.where(fits, values, zero + np.clip(day, -most_day, most_day))
 
 
 def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, resting: bool) -> WatchState:
@@ -201,15 +177,6 @@ def _start(watch: Watch, state: WatchState, time: float, values: FloatArray, res
         predicted=used @ direct + memory @ weights,
         still=np.full(used.shape, time),
     )
-
-
-def _plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
-    """Return a mask of the plausible temperatures, by the same rules as the gate of the compensator."""
-    low, high, width = watch.ranges
-    span = np.maximum(width, watch.thresholds.least_margin)
-    least, most = watch.thresholds.plausible["temperature"]
-    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # False for nan
-    return np.asarray(within)
 
 
 def _stand_in(watch: Watch, state: WatchState, time: float) -> FloatArray:
@@ -248,24 +215,11 @@ def _step(
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
     s, stuck = _stuck(watch, s, x, calm)
-    s, wrong = _check_speeds(watch, s, speeds, calm, dt)
+    found, wrong = heat.check(watch, s.heat, speeds, used, memory, (time, dt), failed, _last_change(s, calm))
+    s = s._replace(heat=found)
     s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
     s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting, wrong))
     return _returns(watch, s, difference)
-
-
-def _check_speeds(
-    watch: Watch, s: WatchState, speeds: FloatArray, calm: BoolArray, dt: float
-) -> tuple[WatchState, BoolArray]:
-    """Compare the heats of the speeds with their estimates; return the speeds that have been wrong for too long."""
-    if not watch.checks:
-        return s, np.zeros(speeds.shape, dtype=np.bool_)
-    lost, lags = np.isnan(speeds), s.memory.shape[-1] - len(watch.states)
-    found = heat.advance(
-        watch, heat.lose(s.heat, s.time, lost), speeds, s.used, s.memory[..., :lags], s.fault != GOOD, dt
-    )
-    found, wrong = heat.find_lasting(watch, found, s.time, _last_change(s, calm))
-    return s._replace(heat=heat.trust_again(watch, found, s.time, lost)), wrong
 
 
 def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
@@ -375,21 +329,12 @@ def _blame(
     one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm, s.heat)
     slow = speeds_fail(watch, x, s.memory, calm, s.heat) < one.rest  # speeds explain the residuals better
     alone = ~swapped & ~(stepped | stuck).any(axis=-1)
-    s = _fail_speeds(watch, s, speeds & (alone & slow & ~pair)[..., None])
+    if (fails := speeds & (alone & slow & ~pair)[..., None]).any():
+        supervised, memory = heat.fail(watch, s.heat, s.memory, fails)
+        s = s._replace(heat=supervised, memory=memory, off=np.where(fails.any(axis=-1, keepdims=True), np.nan, s.off))
     # otherwise no single failure explains the residuals: the machine is unlike its training
     sure = lasting & alone & ~slow & ~doubt & (one.worst <= 1.0)
     return _fail(watch, s, sure[..., None] & one.sensors, OFF, np.zeros(x.shape))
-
-
-def _fail_speeds(watch: Watch, s: WatchState, found: BoolArray) -> WatchState:
-    """Exclude speeds; their states become those of the speeds that explain the temperatures."""
-    if not found.any():
-        return s
-    memory, lags = s.memory.copy(), s.memory.shape[-1] - len(watch.states)
-    memory[..., lags:] = np.where(found.take(watch.state_speeds, axis=-1), s.heat.states, memory[..., lags:])
-    fault = np.where(found, OFF, s.heat.fault).astype(np.int8)
-    off = np.where(found.any(axis=-1, keepdims=True), np.nan, s.off)
-    return s._replace(memory=memory, heat=s.heat._replace(fault=fault), off=off)
 
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:

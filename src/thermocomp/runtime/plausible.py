@@ -1,0 +1,36 @@
+"""Which temperatures a watch accepts as readings: by the same rules as the gate of the compensator."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermocomp.core.watch import Watch
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def replace_first(watch: Watch, values: FloatArray) -> FloatArray:
+    """Return the first readings; an implausible one gets the others' median offset from the zero of the training.
+
+    Plausible readings are those that the gate of the compensator accepts at a start.
+    """
+    zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
+    zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
+    span = np.maximum(width, watch.thresholds.least_margin)
+    least, most = watch.thresholds.plausible["temperature"]
+    with np.errstate(all="ignore"):
+        offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
+        middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
+        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan is sorted last
+        fits = np.abs(offset - day) <= span
+    most_day = watch.thresholds.zero_change
+    return np.where(fits, values, zero + np.clip(day, -most_day, most_day))
+
+
+def is_plausible(watch: Watch, change: FloatArray, values: FloatArray) -> BoolArray:
+    """Return a mask of the plausible temperatures, by the same rules as the gate of the compensator."""
+    low, high, width = watch.ranges
+    span = np.maximum(width, watch.thresholds.least_margin)
+    least, most = watch.thresholds.plausible["temperature"]
+    within = (change >= low - span) & (change <= high + span) & (values >= least) & (values <= most)  # False for nan
+    return np.asarray(within)
