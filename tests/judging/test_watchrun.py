@@ -119,6 +119,28 @@ def test_what_is_kept_after_the_first_readings_is_alike(rows: int) -> None:
     check(samples.time[:rows], samples.values[:rows, places], samples.stands[:rows], None, watch)
 
 
+@pytest.mark.parametrize("machine", [watched, six])
+@pytest.mark.parametrize("kind", ["zero", "half", "stuck", "double", "gone", "per second"])
+def test_wrong_speeds_are_found_alike(kind: str, machine: Callable[[], tuple[Watch, Samples]]) -> None:
+    watch, samples = machine()
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]].copy()
+    found = set[int]()
+    for row in np.flatnonzero(np.diff(values[:, -1])).tolist()[1:7:3]:  # where the spindle starts and stops
+        wrong, begin_at = values.copy(), row + 20
+        right, mine = wrong[begin_at:, -1], slice(begin_at + 400)
+        changed = {"zero": 0.0 * right, "half": right / 2, "double": 2.0 * right, "per second": right / 60}
+        wrong[begin_at:, -1] = changed.get(kind, np.full_like(right, values[row, -1] if kind == "stuck" else np.nan))
+        found |= set(check(samples.time[mine], wrong[mine], samples.stands[mine], None, watch)[:, -1])
+    assert found >= {0, 1 if kind == "gone" else 4}
+
+
+def test_a_start_with_a_turning_spindle_is_alike() -> None:
+    watch, samples = six()
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]]
+    later = slice(int(np.flatnonzero(values[:, -1])[60]), None)
+    assert not check(samples.time[later][:90], values[later][:90], samples.stands[later][:90], values[0], watch).any()
+
+
 @given(st.data())
 def test_hostile_readings_are_found_alike(data: st.DataObject) -> None:
     watch, samples = watched()
