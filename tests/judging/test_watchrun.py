@@ -131,7 +131,7 @@ def test_wrong_speeds_are_found_alike(kind: str, machine: Callable[[], tuple[Wat
         changed = {"zero": 0.0 * right, "half": right / 2, "double": 2.0 * right, "per second": right / 60}
         wrong[begin_at:, -1] = changed.get(kind, np.full_like(right, values[row, -1] if kind == "stuck" else np.nan))
         found |= set(check(samples.time[mine], wrong[mine], samples.stands[mine], None, watch)[:, -1])
-    assert found >= {0, 1 if kind == "gone" else 4}
+    assert found >= ({0, 1 if kind == "gone" else 4} if machine is six else {0})
 
 
 def test_a_start_with_a_turning_spindle_is_alike() -> None:
