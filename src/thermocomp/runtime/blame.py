@@ -34,8 +34,8 @@ def find_limits(watch: Watch, memory: FloatArray) -> FloatArray:
     return np.asarray(watch.limits("off") + watch.thresholds.more_heat * caused)
 
 
-def one_fails(watch: Watch, difference: FloatArray, able: BoolArray, heat: HeatState) -> Blamed:
-    """Return the sensor whose failure, immediate or after the lags, leaves the smallest residuals, those of heats too.
+def one_fails(watch: Watch, difference: FloatArray, able: BoolArray, heat: HeatState | None = None) -> Blamed:
+    """Return the sensor whose failure, immediate or after the lags, leaves the smallest residuals.
 
     Parameters
     ----------
@@ -43,15 +43,17 @@ def one_fails(watch: Watch, difference: FloatArray, able: BoolArray, heat: HeatS
         Difference of reading and prediction; 0 if there is none [degC].
     able : ndarray of bool of shape (..., n_sensors)
         Sensors that may have failed.
+    heat : HeatState, optional
+        Its residuals must be explained, too.
     """
     weights, most = watch.limits("unseen"), watch.limits("off")
-    if watch.checks:
+    if heat is not None and watch.checks:
         weights = np.append(weights, watch.heat_constants.unseen)
         most = np.append(most, watch.heat_constants.off)
         difference = np.concatenate([difference, residuals(watch, heat)], axis=-1)
     scaled = difference / weights
     found = _nobody(able)
-    for shape in watch.signatures / weights[:, None]:  # (n, n_faulty)
+    for shape in watch.signatures[:, : len(weights)] / weights[:, None]:  # (n, n_faulty)
         amount = np.einsum("...i,ij->...j", scaled, shape) / (shape**2).sum(axis=0)
         left = np.swapaxes(scaled[..., :, None] - shape * amount[..., None, :], -1, -2) * weights
         rest = np.where(able, ((left / weights) ** 2).sum(axis=-1), np.inf)

@@ -317,7 +317,7 @@ def _blame(
     if not wrong.any():
         return s
     direct, states = watch.read_out
-    one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able, s.heat)
+    one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able)
     rest = np.minimum(one.rest, speeds_fail(watch, x, s.memory, able, s.heat))
     doubt = heat.in_doubt(watch, s.heat, s.time) & ~speeds.any(axis=-1)  # then no temperature is excluded
     pair = (both.worst <= 1.0) & (both.rest < rest)

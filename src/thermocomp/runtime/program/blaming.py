@@ -3,7 +3,7 @@
 from thermocomp.runtime.program import heating
 from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
-from thermocomp.runtime.program.values import Number, flag, real
+from thermocomp.runtime.program.values import Number, Whole, flag, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import GOOD, OFF, STEPPED, STUCK, SWAPPED
 
@@ -52,7 +52,10 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         for i in each("i", t.SENSORS):
             w.able[i] = w.able[i] & ~s.has_jumped[i]
             w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
-        weigh_one(s, w, t)
+        for c in each("c", t.CHECKS):
+            trusted = s.fault[t.speed_fault[t.check_speed[c]]].equals(GOOD)
+            w.weighed[t.SENSORS + c] = choose(trusted, s.heat[c] - s.estimate[c], 0.0)
+        weigh_one(s, w, t, t.RESIDUALS)
         sure = let("sure", w.lasting & ~swapped & ~alone)
         with when(t.supervised):
             heating.weigh_speeds(s, w, t)
@@ -76,7 +79,7 @@ def find_one(s: Kept, w: Work, t: Constants) -> None:
     for i in each("i", t.SENSORS):
         with when(~w.able[i]):
             w.weighed[i] = 0.0
-    weigh_one(s, w, t)
+    weigh_one(s, w, t, t.SENSORS)
 
 
 @procedure
@@ -91,26 +94,23 @@ def differ(s: Kept, w: Work, t: Constants) -> None:
 
 
 @procedure
-def weigh_one(s: Kept, w: Work, t: Constants) -> None:
-    """Find the sensor whose failure, immediate or lagged, leaves the smallest differences."""
+def weigh_one(s: Kept, w: Work, t: Constants, rows: Whole) -> None:
+    """Find the sensor whose failure, immediate or lagged, leaves the smallest of the first so many residuals."""
     w.one = -1
     w.one_rest = 0.0
     w.one_worst = 0.0
-    for c in each("c", t.CHECKS):
-        trusted = s.fault[t.speed_fault[t.check_speed[c]]].equals(GOOD)
-        w.weighed[t.SENSORS + c] = choose(trusted, s.heat[c] - s.estimate[c], 0.0)
     for h in each("h", t.SHAPES):
         for j in each("j", t.SENSORS):
             with when(w.able[j]):
                 amount = let("amount", real(0.0))
                 square = let("square", real(0.0))
-                for i in each("i", t.RESIDUALS):
+                for i in each("i", rows):
                     amount.set(amount + w.weighed[i] / t.unseen[i] * t.shape[h, i, j])
                     square.set(square + t.shape[h, i, j] * t.shape[h, i, j])
                 amount.set(amount / square)
                 rest = let("rest", real(0.0))
                 worst = let("worst", real(0.0))
-                for i in each("i", t.RESIDUALS):
+                for i in each("i", rows):
                     left = let("left", w.weighed[i] / t.unseen[i] - t.shape[h, i, j] * amount)
                     rest.set(rest + left * left)
                     worst.set(larger(worst, abs(left * t.unseen[i] / t.off_limit[i])))
