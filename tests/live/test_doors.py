@@ -4,6 +4,7 @@ import asyncio
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -12,12 +13,15 @@ from typing import Any
 
 import httpx
 import pytest
-from test_loop import Given, machine
+from pydantic import TypeAdapter, ValidationError
+from test_loop import Controller, Given, machine
 from test_page import RIGHT, TOKEN, asking, fed, run
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.reading import Measurement
 from thermocomp.live.loop import Service
 from thermocomp.live.page import web
+from thermocomp.live.page.answers import CurvesAnswer, DoneAnswer, RefusedAnswer, StateAnswer
 from thermocomp.live.page.page import make_app
 
 HOLD = {"target": "z_um", "do": "hold"}
@@ -142,12 +146,55 @@ def test_by_which_names_it_may_be_called(host: str, code: int) -> None:
     run(work)
 
 
-def test_what_can_be_asked_is_described() -> None:
+def test_what_can_be_asked_is_described_with_its_answers() -> None:
+    service = Service(machine(), [Given()], [Controller()])
+
     async def work() -> None:
-        async with asking(make_app(serving(), TOKEN)) as client:
+        async with asking(make_app(service, TOKEN)) as client:
+
+            async def state() -> dict[str, Any]:
+                found: dict[str, Any] = (await client.get("/api/state")).json()
+                StateAnswer.model_validate(found, strict=True)
+                return found
+
             found = (await client.get("/openapi.json")).json()
-            assert set(found["paths"]) >= {"/api/state", "/api/curves", "/api/events", "/api/order"}
+            assert set(found["paths"]) == {"/", "/api/state", "/api/curves", "/api/events", "/api/order"}
             assert (await client.get("/docs")).status_code == 404  # its page comes from another site
+            for path, kind, says in (
+                ("/", "text/html", {"type": "string"}),
+                ("/api/events", "text/event-stream", {"type": "string"}),
+                ("/api/state", "application/json", {"$ref": "#/components/schemas/StateAnswer"}),
+                ("/api/curves", "application/json", {"type": "object"}),
+            ):
+                content = found["paths"][path]["get"]["responses"]["200"]["content"]
+                assert set(content) == {kind}
+                assert says.items() <= content[kind]["schema"].items()
+            await state()
+            fed(service, 20.0, 23.0)
+            service.measure(Measurement(time.time(), "z_um", 6.5, left=False))
+            fed(service, 23.0)
+            told = await state()
+            assert told["residuals"]
+            assert told["targets"][0]["reference"]
+            TypeAdapter(CurvesAnswer).validate_python((await client.get("/api/curves")).json(), strict=True)
+            with pytest.raises(ValidationError):
+                StateAnswer.model_validate(told | {"not described": 1})
+            order = found["paths"]["/api/order"]["post"]
+            for body, headers, code in (
+                (HOLD, RIGHT, 200),
+                (HOLD | {"target": "a"}, RIGHT, 404),
+                (HOLD | {"do": "roll back"}, RIGHT, 200),
+                (HOLD | {"do": "roll back"}, RIGHT, 409),
+                (HOLD | {"do": "roll back"}, {}, 401),
+                ({}, RIGHT, 422),
+            ):
+                answer = await client.post("/api/order", json=body, headers=headers)
+                assert answer.status_code == code
+                name = order["responses"][str(code)]["content"]["application/json"]["schema"]["$ref"]
+                kind = {"DoneAnswer": DoneAnswer, "RefusedAnswer": RefusedAnswer}[name.rpartition("/")[2]]
+                kind.model_validate(answer.json())
+            says = order["requestBody"]["content"]["application/json"]["schema"]
+            assert set(says["properties"]) == {"target", "do"}
 
     run(work)
 

@@ -396,6 +396,7 @@ def test_what_a_controller_says_goes_before_what_a_file_says(tmp_path: Path) -> 
 def test_a_measurement_under_a_correction_that_nobody_knows_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inforce, "CONFIRM_WITHIN", 0.3)
     source, controller = Given(), Controller()
+    controller.offset = 0.5
     service = Service(machine(), [source], [controller])
 
     async def work() -> None:
@@ -505,6 +506,7 @@ def test_two_probings_before_a_reading_and_one_of_tomorrow() -> None:
 
 def test_an_alarm_is_told_and_suspends_nothing() -> None:
     source, controller = Given(), Controller()
+    controller.offset = 0.0
     service = Service(machine(), [source], [controller])
 
     async def work() -> None:

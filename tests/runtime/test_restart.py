@@ -8,6 +8,7 @@ import pytest
 from driftmodels import ACCEPTED
 from hypothesis import given
 from hypothesis import strategies as st
+from watchedmachine import failing, watched_model
 
 from thermocomp.core.correction import Correction, Deviation, Limits
 from thermocomp.core.exceptions import InputError
@@ -262,3 +263,18 @@ def test_many_restarts_do_not_slow_the_clock_of_the_models() -> None:
         state = resume(state, MACHINE.start(), silence(state, clock + 5.0), tick=clock + 5.0)
     assert state.time == pytest.approx(HOUR + 570.0)
     assert found[-1] == pytest.approx(offsets[-3], abs=0.1)
+
+
+def test_a_temperature_that_is_the_same_by_chance_after_an_outage_is_not_stuck() -> None:
+    day, compensator = failing(), Compensator.of([watched_model()], LIMITS)
+    inputs = [c.name for c in day.channels if c.quantity in ("temperature", "spindle_speed")]
+    time, rows = day.time - day.time[0], day.table[inputs].to_dict("records")
+    before, after = (int(np.searchsorted(time, hours * HOUR)) for hours in (6.0, 9.0))
+    state = compensator.start()
+    for k in range(before):
+        state, _ = compensator.step(state, Reading(time[k], rows[k]), time[k])
+    for name in (n for n in inputs if n.startswith("t")):
+        now, age = float(time[after]), float(time[after] - time[before - 1])
+        again = resume(state, compensator.start(), age, None, now)
+        reading = Reading(now, rows[after] | {name: rows[before - 1][name]})
+        assert compensator.step(again, reading, now, tick=now)[1].failed == {}

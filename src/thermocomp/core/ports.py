@@ -75,7 +75,10 @@ class Confirming(Protocol):
 
 @runtime_checkable
 class Remembering(Protocol):
-    """A sink that can return what was last sent to it, by an earlier run of the service."""
+    """A sink that can return what was last sent to it, by an earlier run of the service.
+
+    Its attribute ``last_time``, if it has one, is the time at which that was sent [s since 1970].
+    """
 
     async def last_sent(self) -> Mapping[str, Correction] | None:
         """Return the corrections last sent, per axis or target; None if there are none."""

@@ -14,6 +14,8 @@ from thermocomp.runtime.state import NO_ZERO, CompensatorState, Status
 
 #: difference from the corrections sent lately above which another one is in force [um]
 ASIDE = 1.0
+#: time without a confirmation after which a target is no longer active; sinks are asked every 2 s [s of real time]
+ACTIVE_WITHIN = 4.0
 
 
 class AtController(NamedTuple):
@@ -81,7 +83,7 @@ class ConfirmedCorrections:
             return AtController("sent, not confirmed", f"{mine[0].name} does not confirm what the controller has")
         found, at = self.confirmed.get(target, (None, -math.inf))
         age = (self._clock.tick() - at) / self._clock.speed
-        if found is None or age > CONFIRM_WITHIN:
+        if found is None or age > ACTIVE_WITHIN:
             topic = getattr(controllers[0].sink, "confirm_topic", "") or controllers[0].name
             out = "no report of the correction in force" if found is None else f"the last report is {age:.0f} s old"
             return AtController("not confirmed", f"{topic}: {out}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from thermocomp.core.correction import Correction
 from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.live import statefile
 from thermocomp.live.clock import ServiceClock
@@ -19,6 +20,10 @@ CONFIGURED = "by configuration"
 #: orders that remain although there is no zero: the correction is not in force, or not known
 _STRONGER = ("shadow", *UNKNOWN)
 _ASKED = "let the machine cool down, set its zero anew, then order 're-zero'"
+#: in a state file, while the only zero there is was taken on a machine that may have been warm
+_INVALID = StoredZero(begun=math.nan, read=math.nan, inputs={}, targets={})
+#: correction in force above which the machine may be warm [um]
+WARM = 1.0
 
 
 class StateKeeper:
@@ -47,6 +52,9 @@ class StateKeeper:
         self.pending: StateOfOthers | None = None
         #: order of targets whose models have no valid zero
         self.no_zero: Status | None = None
+        #: why the models take a new zero at the start; empty if they continue from the state
+        self.cold = "" if path is not None else "no state file is configured"
+        self._aged: Mapping[str, Correction] | None = None  # corrections of a state that is older than a day
         self._zero: StoredZero | None = None
         self._age = self._begun = 0.0  # age of the state when it was read, and the time of the clock [s]
 
@@ -56,6 +64,7 @@ class StateKeeper:
         if self._path is None:
             return cold
         if not self._path.exists():
+            self.cold = f"there is no {self._path.name}"
             self._say(f"cold start: there is no {self._path}")
             return cold
         self.first = False
@@ -69,15 +78,19 @@ class StateKeeper:
             if (others := statefile.read_zero(self._path)) is not None:
                 return self._begin_with_others(others, cold)
             self._say(f"cold start: {e}")
-            self._refused = self._path
+            self._refused, self.cold = self._path, f"{self._path.name} cannot be used"
             return cold
         age, self._zero = self._date(saved.written), None if saved.others is None else saved.others.zero
         most = self._compensator.thresholds.resumable
         state, recent = resume(saved.state, cold, age, None, self._begun, most), 0.0 <= age <= most
         self.known = frozenset(state.corrections)
         state = state._replace(orders=cold.orders | _restored(state.orders, cold=not recent))
-        if recent and self._zero is not None and self._zero.begun != state.zeroed:
-            held = [o for o in state.orders.values() if o.word == NO_ZERO]
+        held = [o for o in state.orders.values() if o.word == NO_ZERO]
+        if not recent:
+            self.cold, self._aged = f"{self._path.name} is {_tell_age(age)}", state.corrections
+        elif self._zero is None:
+            self.no_zero = held[0] if held else None
+        elif self._zero.begun != state.zeroed:
             state = self._hold(state, held[0].reason if held else f"these models took their zero warm: {_ASKED}")
         how = "continues" if state.references else "starts again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
@@ -102,6 +115,7 @@ class StateKeeper:
             self.pending = others
             self._say(f"start with other models after {age:.0f} s: they take over the zero of {others}")
         else:
+            self.cold, self._aged = f"{others} belongs to other models, and is {_tell_age(age)}", found
             self._say(f"cold start: {others} belongs to other models, and is {age:.0f} s old")
         return cold._replace(
             corrections=cold.corrections | found, orders=cold.orders | orders, away=age if age >= 0.0 else math.nan
@@ -120,6 +134,27 @@ class StateKeeper:
         why = "the models are new: the correction moves to theirs"
         kept = rebuilt._replace(orders=state.orders, because=why if age <= self._compensator.limits.hold else "")
         return resume(kept, state, age, state.corrections, self._begun, math.inf)
+
+    def hold_if_warm(
+        self, state: CompensatorState, target: str, in_force: Correction, *, lately: bool
+    ) -> CompensatorState:
+        """Return the state with the corrections held if the models take a new zero on a machine that may be warm.
+
+        After more than a day the machine counts as cold, unless it was compensated since then.
+
+        Parameters
+        ----------
+        in_force : Correction
+            As known to a sink.
+        lately : bool
+            It was in force, or sent, less than a day ago.
+        """
+        if not self.cold or self.no_zero is not None or _size(in_force) <= WARM:
+            return state
+        if self._aged is not None and not lately and _size(in_force, self._aged.get(target)) <= WARM:
+            return state
+        what = f"{in_force.offset:+.1f} um" + (f" and {in_force.slope:+.1f} um/m" if in_force.slope else "")
+        return self._hold(state, f"{self.cold}, but {what} are in force, so the machine may be warm: {_ASKED}")
 
     def _hold(self, state: CompensatorState, why: str) -> CompensatorState:
         """Return the state with the corrections held, until there is a valid zero; shadow comes before that."""
@@ -142,12 +177,24 @@ class StateKeeper:
             old = timedelta(seconds=silence(state, self._clock.tick()) / self._clock.speed)
             # without a valid zero, the last valid one stays in the file; the state does not begin with it, and so tells
             before = self._zero if self.no_zero is not None or math.isnan(state.origin) else None
+            if before is None and self.no_zero is not None:
+                before = _INVALID
             statefile.write(state, self._compensator, self._path, datetime.now(UTC) - old, before)
             self.not_saved = ""
         except (ThermocompError, OSError) as e:
             if not self.not_saved:
                 self._say(f"the state is not saved: {e}")
             self.not_saved = str(e)
+
+
+def _size(found: Correction, other: Correction | None = None) -> float:
+    """Return the size of a correction, or of its difference from another one [um, um/m]."""
+    other = other or Correction(0.0)
+    return max(abs(found.at(0.0) - other.at(0.0)), abs(found.slope - other.slope))
+
+
+def _tell_age(age: float) -> str:
+    return f"{age / 3600.0:,.0f} h old" if age >= 0.0 else "of a time to come"
 
 
 def _restored(orders: Mapping[str, Status], *, cold: bool) -> dict[str, Status]:

@@ -233,6 +233,7 @@ class Service:
                 moves = known.offset or known.slope
                 if moves and target not in self.keeper.known:  # not active before it has caught up
                     self.state = self.state._replace(away=math.nan)
+                self._hold_if_warm(target, known)
                 continue
             if waits or target in self.keeper.known or not any(o.receives(target) for o in self.outlets):
                 continue
@@ -246,7 +247,15 @@ class Service:
     def _start_from(self, target: str, in_force: Correction) -> None:
         """Start a target from the correction in force."""
         self.state = start_from(self.compensator, self.state, target, in_force)
+        self._hold_if_warm(target, in_force)
         self._hold_without_zero(target)
+
+    def _hold_if_warm(self, target: str, in_force: Correction) -> None:
+        """Hold the corrections if the models would take a new zero while a sink knows of a correction in force."""
+        before, lately = self.keeper.no_zero, target in self.start_values.lately
+        self.state = self.keeper.hold_if_warm(self.state, target, in_force, lately=lately)
+        if before is None and (held := self.keeper.no_zero) is not None:
+            self.say("reference", f"no zero is taken: {held.reason}")
 
     def _hold_without_zero(self, target: str) -> Status | None:
         """Hold a target that would run although its models have no valid zero; return its order then."""

@@ -1,11 +1,13 @@
 """Corrections in force when the service starts: confirmed by the controller, or as last sent by an earlier run."""
 
 import asyncio
+import math
+import time
 from collections.abc import Mapping
 from typing import Literal
 
 from thermocomp.core.correction import Correction
-from thermocomp.core.ports import Confirming, Remembering, Sink
+from thermocomp.core.ports import Confirming, Remembering, Sink, Suspending
 from thermocomp.live.inforce import confirms
 from thermocomp.live.links import TIMEOUT
 from thermocomp.runtime.compensator import Compensator
@@ -33,6 +35,8 @@ class StartValues:
         self._compensator = compensator
         self._confirmed, self._sent = dict[str, Correction](), dict[str, Correction]()
         self.asked = list[Sink]()  #: sinks that have answered, also with nothing
+        #: targets whose correction was in force, or sent, less than a day ago
+        self.lately = set[str]()
 
     async def ask(self, sink: Sink) -> None:
         """Connect a sink and ask it for the corrections in force."""
@@ -49,10 +53,14 @@ class StartValues:
             found = self.within_limits(report or {})
             if confirms(sink):
                 self._confirmed |= found
+                if isinstance(sink, Suspending):  # without a service its correction fades
+                    self.lately |= found.keys()
             else:
                 self._sent |= found
         if isinstance(sink, Remembering):
-            self._sent |= self.within_limits(await sink.last_sent() or {})
+            self._sent |= (sent := self.within_limits(await sink.last_sent() or {}))
+            if time.time() - getattr(sink, "last_time", -math.inf) <= self._compensator.thresholds.resumable:
+                self.lately |= sent.keys()
         self.asked.append(sink)
 
     def of(self, target: str) -> Correction | None:

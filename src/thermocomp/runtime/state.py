@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.state import State
 from thermocomp.core.thresholds import THRESHOLDS
@@ -107,8 +109,9 @@ def resume(
     """Return the state with which to continue after a restart.
 
     Up to the age `resumable` the models continue from their memory, as after an outage: their first inputs are
-    assumed to have been constant during the outage. With a greater or unknown age, the compensator starts again. In
-    both cases the correction in force is kept and moves from there within the limits.
+    assumed to have been constant during the outage, but no temperature counts as stuck because it is the same as
+    before. With a greater or unknown age, the compensator starts again. In both cases the correction in force is kept
+    and moves from there within the limits.
 
     Parameters
     ----------
@@ -124,4 +127,7 @@ def resume(
     corrections = {t: (in_force or state.corrections).get(t, c) for t, c in cold.corrections.items()}
     if not 0.0 <= age <= resumable:
         return cold._replace(corrections=corrections, orders=state.orders, away=age if age >= 0 else math.nan)
-    return state._replace(corrections=corrections, clock=None, taken=tick, origin=math.nan, away=age)
+    watches = state.watches
+    if age > THRESHOLDS.fault_duration:  # a value that is the same by chance was not constant meanwhile
+        watches = tuple(w._replace(same=np.full_like(w.same, np.nan)) for w in watches)
+    return state._replace(watches=watches, corrections=corrections, clock=None, taken=tick, origin=math.nan, away=age)

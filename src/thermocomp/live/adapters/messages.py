@@ -133,6 +133,12 @@ def read_corrections(payload: bytes | str) -> dict[str, Correction]:
     return found
 
 
+def read_time(payload: bytes | str) -> float:
+    """Return the time of a message of `write_message` [s since 1970]; -inf if it has none."""
+    found = _number(_table(payload, "{}").get("time"))
+    return -math.inf if found is None else found
+
+
 def _table(payload: bytes | str, example: str) -> dict[str, Any]:
     if len(payload) > MOST_BYTES:
         raise ReadingError(f"a message of {len(payload):,} bytes; at most {MOST_BYTES:,} are accepted")

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
@@ -17,7 +18,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.core.shown import escape
 from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.inbox import Inbox
-from thermocomp.live.adapters.messages import read_corrections, read_message, write_message
+from thermocomp.live.adapters.messages import read_corrections, read_message, read_time, write_message
 from thermocomp.live.adapters.reportedchanges import ReportedChanges
 
 
@@ -179,6 +180,7 @@ class MqttSink(Broker):
     confirm_topic: str = ""
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
+    last_time: float = field(default=-math.inf, init=False)  #: of the retained message [s since 1970]
     _statuses: dict[str, TargetStatus] = field(default_factory=dict, init=False, repr=False)
     _sequence: int = field(default=0, init=False, repr=False)
     _before: dict[str, Correction] | None = field(default=None, init=False, repr=False)
@@ -227,7 +229,7 @@ class MqttSink(Broker):
                     continue
                 if message.topic.matches(self.topic):
                     if message.retain:
-                        self._before = found
+                        self._before, self.last_time = found, read_time(payload)
                     await client.unsubscribe(self.topic)
                 elif not message.retain:
                     self._reported = found

@@ -9,6 +9,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.shown import escape, shorten
 from thermocomp.core.strictjson import parse_json
 from thermocomp.live.loop import Service
+from thermocomp.live.page.answers import DoneAnswer, describe
 from thermocomp.live.page.doors import Json
 from thermocomp.live.page.pages import Board
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Status
@@ -22,11 +23,20 @@ class PageOrder(BaseModel):
     do: Literal["start", "run", "hold", "shadow", "rezero", "roll back"]
 
 
+#: the body is read by hand: its size and its encoding are checked first
+_BODY = {"required": True, "content": {"application/json": {"schema": PageOrder.model_json_schema()}}}
+
+
 def make_router(board: Board) -> APIRouter:
     """Return the router of ``/api/order``."""
     router, service = APIRouter(), board.service
 
-    @router.post("/api/order", dependencies=board.orders_only())
+    @router.post(
+        "/api/order",
+        dependencies=board.orders_only(),
+        responses=describe(401, 403, 404, 409, 413, 422, 429, answer=DoneAnswer),
+        openapi_extra={"requestBody": _BODY},
+    )
     async def order(request: Request) -> Json:
         wanted = read_order(await request.body())
         if wanted.target not in service.compensator.lines:

@@ -3,11 +3,13 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator
+from typing import Any
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, StreamingResponse
 
 from thermocomp.live.loop import Service
+from thermocomp.live.page.answers import CurvesAnswer, StateAnswer, describe
 from thermocomp.live.page.connections import Guarded
 from thermocomp.live.page.doors import Json, write_json
 from thermocomp.live.page.pages import Board, read_template
@@ -17,6 +19,14 @@ from thermocomp.live.page.snapshot import curves, snapshot
 OFTEN = 0.5
 #: maximum number of pages open at once
 MOST_PAGES = 100
+
+_SAYS = "each message is JSON: the state as of /api/state, and the last point of the curves"
+_STREAM: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": f"events, twice a second; {_SAYS}",
+        "content": {"text/event-stream": {"schema": {"type": "string"}}},
+    }
+}
 
 
 class Streams:
@@ -61,19 +71,19 @@ def make_router(board: Board) -> APIRouter:
     router, service, template = APIRouter(), board.service, read_template("live.html")
     streams = Streams(service, board.settled)
 
-    @router.get("/")
+    @router.get("/", response_class=HTMLResponse)
     async def show() -> HTMLResponse:
         return HTMLResponse(template.render(targets=list(service.compensator.lines), orders=bool(board.token)))
 
-    @router.get("/api/state")
+    @router.get("/api/state", responses=describe(403, answer=StateAnswer))
     async def tell() -> Json:
         return Json(snapshot(service, board.settled))
 
-    @router.get("/api/curves")
+    @router.get("/api/curves", responses=describe(403, answer=CurvesAnswer))
     async def draw() -> Json:
         return Json(curves(service))
 
-    @router.get("/api/events")
+    @router.get("/api/events", response_class=StreamingResponse, responses=describe(403) | _STREAM)
     async def follow(request: Request) -> StreamingResponse:
         messages = streams.messages(getattr(request.state, "connection", None))
         return StreamingResponse(messages, media_type="text/event-stream", headers={"Cache-Control": "no-store"})
