@@ -1,6 +1,6 @@
 """Whether the do-no-harm gate permits a model to run, and to run without some of its inputs."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
@@ -22,6 +22,16 @@ class Gated:
     def may_lose(self, names: Collection[str]) -> bool:
         """Return whether the model without these inputs is better than no compensation: see `HonestError.may_lose`."""
         return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
+
+    def wrong_speeds(self, failed: Mapping[str, str]) -> list[str]:
+        """Return the speeds among the inputs that were wrong before that was found: the states remember them.
+
+        Parameters
+        ----------
+        failed : mapping of str to str
+            Sensors that are not trusted, with the kind of fault.
+        """
+        return [i.name for i in self.inputs if i.quantity == "spindle_speed" and failed.get(i.name) == "off"]
 
     def widening(self, names: Collection[str]) -> float:
         """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""

@@ -96,6 +96,12 @@ class Thresholds:
     speed_doubt: float = _fixed(
         1800.0, "s", "while a speed is in doubt for less than this, no temperature is excluded in its place", _HEAT
     )
+    speed_preferred: float = _fixed(
+        4.0,
+        "",
+        "a wrong speed is more likely than a failed temperature unless its squares are this many times as large",
+        _HEAT,
+    )
 
     # repetition of all temperatures
     repeat_factor: float = _fixed(

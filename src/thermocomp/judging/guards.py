@@ -73,8 +73,11 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
         mine = rows_until(samples, rows, test, watch.zeroing, columns)
         mine = mine[samples.valid[mine]]
         zero, given = samples.reference()[test][columns], samples.given_zero(test, columns)
-        for k, failed in enumerate(cut):  # the sensors read their zero
-            values = np.where(failed, zero, samples.values[mine][:, columns])
+        begun = samples.time[mine] > samples.time[mine[0]] + watch.zeroing.at_rest if len(mine) else mine > 0
+        missing = begun[:, None] & np.isin(np.arange(len(columns)), watch.speeds)
+        for k, failed in enumerate(cut):  # temperatures read their zero, speeds are missing once the zero is known
+            values = np.where(failed & ~missing, zero, samples.values[mine][:, columns])
+            values[failed & missing] = np.nan
             found[k, mine], _ = run_watch(watch, samples.time[mine], values, samples.stands[mine], given)
     changed = found != samples.values[:, columns]
     changed &= ~np.isnan(found)

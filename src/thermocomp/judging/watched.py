@@ -14,6 +14,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
+from thermocomp.runtime.watch import WORDS
 
 
 def believe(
@@ -42,12 +43,12 @@ def believe(
     for test in np.unique(samples.test[rows]).tolist():
         mine, passed, faults = look_through(watch, seen, test)
         values[mine[:, None], places] = passed[:, known]
-        cases, which = np.unique(faults != 0, axis=0, return_inverse=True)
-        for case, failed in enumerate(cases.tolist()):
-            lost = [n for n, f in zip(watch.failing, failed, strict=True) if f and n in model.sensors]
-            if lost:
-                wider = model.widening(lost) if model.may_lose(lost) else np.inf
-                widening[mine[which == case]] = wider
+        cases, which = np.unique(faults, axis=0, return_inverse=True)
+        for case, found in enumerate(cases.tolist()):
+            failed = {n: WORDS[f] for n, f in zip(watch.failing, found, strict=True) if f and n in model.sensors}
+            if failed:
+                runs_on = model.may_lose(failed) and not model.wrong_speeds(failed)
+                widening[mine[which.ravel() == case]] = model.widening(failed) if runs_on else np.inf
     return replace(samples, values=values), widening
 
 

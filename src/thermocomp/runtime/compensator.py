@@ -11,7 +11,7 @@ reading and takes effect from the next reading onwards: it measures the error of
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -386,9 +386,11 @@ class Compensator:
         return state._replace(watches=tuple(states), feed=feed), reading, why
 
 
-def _unjudged(models: Sequence[ErrorModel], failed: Collection[str]) -> str:
+def _unjudged(models: Sequence[ErrorModel], failed: Mapping[str, str]) -> str:
     """Return the reason why models must not drive a correction without the failed sensors; empty if they may do so."""
     for model in models:
+        if wrong := model.wrong_speeds(failed):
+            return f"{wrong[0]} was wrong before that was found, and the model of {model.target} remembers it"
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
             return (

@@ -327,7 +327,8 @@ def _blame(
         s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
     calm = able & np.isnan(s.jumped)
     one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm, s.heat)
-    slow = speeds_fail(watch, x, s.memory, calm, s.heat) < one.rest  # speeds explain the residuals better
+    # speeds explain the residuals better; the states of estimated speeds lag behind
+    slow = speeds_fail(watch, x, s.memory, calm, s.heat) < watch.thresholds.speed_preferred * one.rest
     alone = ~swapped & ~(stepped | stuck).any(axis=-1)
     if (fails := speeds & (alone & slow & ~pair)[..., None]).any():
         supervised, memory = heat.fail(watch, s.heat, s.memory, fails)

@@ -59,7 +59,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         sure = let("sure", w.lasting & ~swapped & ~alone)
         with when(t.supervised):
             heating.weigh_speeds(s, w, t)
-            slow.set((w.one < 0) | (w.speeds_rest < w.one_rest))
+            slow.set((w.one < 0) | (w.speeds_rest < t.speed_preferred * w.one_rest))
             sure.set(sure & ~slow & ~w.doubt)
             with when(slow & ~pair & ~swapped & ~alone):
                 heating.fail_speeds(s, w, t)

@@ -324,6 +324,7 @@ class Constants(Record):
     heat_stored = threshold("heat_stored", time=True)
     untrained_heat = threshold("untrained_heat")
     speed_doubt = threshold("speed_doubt", time=True)
+    speed_preferred = threshold("speed_preferred")
 
     # sizes of arrays, and features of a compensator
     CHANNELS = size("values of a reading")

@@ -16,7 +16,7 @@ from thermocomp.runtime.program.language import (
 from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, MISSING
+from thermocomp.runtime.watch import GOOD, MISSING, OFF
 
 HOLDING = 2
 
@@ -313,7 +313,7 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
         for i in each("i", t.FAILING):
             with when(s.fault[i].differs(GOOD) & t.leans_on[m, i]):
                 lost.set(lost + 1)
-                allowed.set(allowed & t.may_lose[m, i])
+                allowed.set(allowed & t.may_lose[m, i] & ((i < t.SENSORS) | s.fault[i].differs(OFF)))
         with when(lost > 1):
             found = let("found", flag(False))
             for j in each("j", t.JUDGED):
