@@ -20,18 +20,19 @@ from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
 SIX = ("t_front_seat_C", "t_motor_C", "t_housing_C", "t_column_front_right_C", "t_enclosure_C", "t_air_C")
+Physics = Literal["linear", "nonlinear"]
 FAULTS = ("zero", "per second", "stuck", "half", "far too high")
 WITHIN = 20 * 60.0
 
 
 @cache
-def day(physics: Literal["linear", "nonlinear"], seed: int, few: bool) -> Samples:
+def day(physics: Physics, seed: int, few: bool) -> Samples:
     whole = stack(virtual.record("demo", physics=physics, seed=seed), ["z_um"])
     return whole.only([*SIX, "spindle_rpm"]) if few else whole
 
 
 @cache
-def fitted(physics: str, few: bool) -> Watch:
+def fitted(physics: Physics, few: bool) -> Watch:
     samples = day(physics, 0, few)
     found = find_watch(samples, samples.cycle >= 0)
     assert found is not None
@@ -62,7 +63,7 @@ def run(watch: Watch, samples: Samples, speed: FloatArray) -> tuple[FloatArray, 
 
 @pytest.mark.parametrize("few", [False, True], ids=["all", "six"])
 @pytest.mark.parametrize("physics", ["linear", "nonlinear"])
-def test_a_wrong_speed_is_named_within_20_minutes_of_running(physics: str, few: bool) -> None:
+def test_a_wrong_speed_is_named_within_20_minutes_of_running(physics: Physics, few: bool) -> None:
     """Of a quarter of the top speed and more; another seed than in the training, 20 instants of each fault."""
     watch, samples = fitted(physics, few), day(physics, 11, few)
     right = samples.values[:, [c.name for c in samples.inputs].index("spindle_rpm")]
