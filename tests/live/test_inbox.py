@@ -11,11 +11,13 @@ import pytest
 from broker import Mosquitto
 from hypothesis import given
 from hypothesis import strategies as st
+from test_loop import machine
 
 from thermocomp.core.reading import Reading
 from thermocomp.live.adapters.inbox import MOST, Inbox
 from thermocomp.live.adapters.mqtt import MqttSource
 from thermocomp.live.latest import Latest
+from thermocomp.live.loop import Service
 from thermocomp.live.stamps import explain_stamp
 
 NOW = 1_790_000_000.0
@@ -98,8 +100,20 @@ def test_an_older_value_does_not_replace_a_newer_one() -> None:
     latest.take({"t": 1.0}, 100.0, 60.0, 95.0)
     latest.take({"t": 2.0}, 101.0, 60.0, 90.0)
     assert latest["t"] == (1.0, 95.0)
+    assert latest.behind == 5.0
     latest.take({"t": 3.0}, 102.0, 60.0, 95.0)
     assert latest["t"] == (3.0, 95.0)
+    assert latest.behind == 0.0
+
+
+def test_values_behind_those_used_are_reported_once_a_minute() -> None:
+    service = Service(machine(), [], [])
+    now = time.time()
+    for stamp in (now, now - 1.0, now - 30.0, now - 29.0):
+        service.take(Reading(stamp, {"t": 20.0}))
+    assert [e.text for e in service.events if "behind" in e.text] == [
+        "values are ignored: their time is 30 s behind that of values before"
+    ]
 
 
 @pytest.mark.parametrize(

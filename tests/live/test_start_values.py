@@ -39,6 +39,11 @@ def service(sink: Any, state: Path | None, **options: Any) -> tuple[Service, Giv
     return Service(machine(SLOW), [source], [sink], state_path=state, **options), source
 
 
+def word(own: Service) -> str:
+    """Return the order in force for the target."""
+    return own.state.orders["z_um"].word
+
+
 async def heat(own: Service, source: Given, degrees: float, seconds: float) -> None:
     """Feed a zero, then a temperature above it."""
     end, first = time.monotonic() + seconds, True
@@ -205,9 +210,9 @@ def test_a_controller_that_comes_later_says_what_is_in_force(tmp_path: Path) -> 
 
     async def work() -> None:
         await until(lambda: "z_um" in own.state.orders)
-        assert own.state.orders["z_um"].word == "first start"
+        assert word(own) == "first start"
         controller.offset = -5.0
-        await until(lambda: own.state.orders["z_um"].word == "no zero")  # where a correction is in force it may be warm
+        await until(lambda: word(own) == "no zero")  # where a correction is in force it may be warm
         assert own.state.corrections["z_um"] == Correction(-5.0)
 
     ran(own, work)
@@ -243,7 +248,7 @@ def test_a_sink_that_is_out_of_reach_at_the_start_knows_later(tmp_path: Path, fi
         heating = asyncio.create_task(heat(own, source, 0.0, 30.0))
         await until(lambda: "z_um" in own.state.orders)
         late.there = True
-        await until(lambda: own.state.orders["z_um"].word == "no zero", 20.0)
+        await until(lambda: word(own) == "no zero", 20.0)
         await until(lambda: len(late.sent) > 2)
         heating.cancel()
 

@@ -268,7 +268,8 @@ def test_many_restarts_do_not_slow_the_clock_of_the_models() -> None:
 def test_a_temperature_that_is_the_same_by_chance_after_an_outage_is_not_stuck() -> None:
     day, compensator = failing(), Compensator.of([watched_model()], LIMITS)
     inputs = [c.name for c in day.channels if c.quantity in ("temperature", "spindle_speed")]
-    time, rows = day.time - day.time[0], day.table[inputs].to_dict("records")
+    rows = [{str(n): float(v) for n, v in row.items()} for row in day.table[inputs].to_dict("records")]
+    time = (day.time - day.time[0]).tolist()
     before, after = (int(np.searchsorted(time, hours * HOUR)) for hours in (6.0, 9.0))
     state = compensator.start()
     for k in range(before):

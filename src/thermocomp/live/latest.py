@@ -20,6 +20,7 @@ class Latest(dict[str, tuple[float, float]]):
     def __init__(self, used: Iterable[str]) -> None:
         super().__init__()
         self.used = set(used)
+        self.behind = 0.0  #: by how much values of the last reading were older than those used; 0: none were [s]
         self._left_out = set[int]()  # hashes of names, because names may be long
 
     @property
@@ -53,9 +54,12 @@ class Latest(dict[str, tuple[float, float]]):
             new = set(ordered[:room])
             first = ordered[room] if len(ordered) > room and not self._left_out else ""
             self._left_out.update(map(hash, ordered[room : room + COUNTED - len(self._left_out)]))
+        self.behind = 0.0
         for name, value in values.items():
             if name in self.used or name in self or name in new:
                 before = self.get(name)
                 if before is None or before[1] <= at + JITTER:
                     self[name] = (value, at)
+                else:
+                    self.behind = max(self.behind, before[1] - at)
         return first

@@ -28,6 +28,9 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
 
+#: values that are older than those used by more than this are reported [s of real time]
+BEHIND = 2.0
+
 
 @dataclass
 class Service:
@@ -71,6 +74,7 @@ class Service:
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
         self._heard = self.clock.tick()
         self._untimely = "", -math.inf  # why the stamp of a reading was invalid, and when
+        self._told_behind = -math.inf
         self._told_untimely, self._begun, self._there = -math.inf, False, dict[str, str]()
 
     # -- interface -----------------------------------------------------------------------------------------------------
@@ -118,6 +122,11 @@ class Service:
             return
         if left_out := self.latest.take(reading.values, tick, most, tick - max(now - stamp, 0.0)):
             self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
+        if self.latest.behind > BEHIND * self.clock.speed and tick - self._told_behind > SELDOM * self.clock.speed:
+            self.say(
+                "link", f"values are ignored: their time is {self.latest.behind:.0f} s behind that of values before"
+            )
+            self._told_behind = tick
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         probings, learned = self.probings.take(), self.state.learned
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)

@@ -10,20 +10,20 @@ Number = float | None
 Time = Annotated[float, Field(description="machine time, seconds since 1970")]
 
 
-class Answer(BaseModel):
+class AnswerPart(BaseModel):
     """An answer, or a part of it: a description only, answers are not built from it."""
 
     model_config = ConfigDict(extra="forbid")
 
 
-class Overall(Answer):
+class Overall(AnswerPart):
     """State of the whole service: that of the target that is worst off, or an alarm."""
 
     word: str
     reason: str
 
 
-class AtControllerAnswer(Answer):
+class AtControllerAnswer(AnswerPart):
     """What is known of a correction at the controller."""
 
     state: Literal["confirmed", "sent, not confirmed", "not confirmed", "not sent"]
@@ -32,14 +32,14 @@ class AtControllerAnswer(Answer):
     age_s: Annotated[Number, Field(description="real time since the confirmation")]
 
 
-class ReferenceAnswer(Answer):
+class ReferenceAnswer(AnswerPart):
     """Zero (reference reading) of a target."""
 
     time: Time
     why: str
 
 
-class TargetAnswer(Answer):
+class TargetAnswer(AnswerPart):
     """A target: its state with the reason, its predicted deviation, its correction."""
 
     name: str
@@ -59,7 +59,7 @@ class TargetAnswer(Answer):
     runs: Annotated[bool, Field(description="false: its model must not run, it is only observed")]
 
 
-class SensorAnswer(Answer):
+class SensorAnswer(AnswerPart):
     """A channel that was received."""
 
     name: str
@@ -68,7 +68,7 @@ class SensorAnswer(Answer):
     state: Annotated[str, Field(description="good, not watched, stale, or the fault")]
 
 
-class LinkAnswer(Answer):
+class LinkAnswer(AnswerPart):
     """A source, probe or sink."""
 
     kind: Literal["source", "probe", "sink"]
@@ -78,14 +78,14 @@ class LinkAnswer(Answer):
     replaced: Annotated[int, Field(description="values replaced by newer ones before they were used")]
 
 
-class Counts(Answer):
+class Counts(AnswerPart):
     """Readings since the start."""
 
     readings: int
     rejected: int
 
 
-class ResidualAnswer(Answer):
+class ResidualAnswer(AnswerPart):
     """A probing compared with the prediction."""
 
     time: Time
@@ -96,7 +96,7 @@ class ResidualAnswer(Answer):
     refused: Annotated[str, Field(description="why the probing was not used; empty if it was")]
 
 
-class EventAnswer(Answer):
+class EventAnswer(AnswerPart):
     """An event, the newest first."""
 
     time: Time
@@ -104,7 +104,7 @@ class EventAnswer(Answer):
     text: str
 
 
-class StateAnswer(Answer):
+class StateAnswer(AnswerPart):
     """State of the service."""
 
     time: Time
@@ -123,14 +123,14 @@ class StateAnswer(Answer):
     events: list[EventAnswer]
 
 
-class DoneAnswer(Answer):
+class DoneAnswer(AnswerPart):
     """A command that was carried out."""
 
     done: str
     target: str
 
 
-class RefusedAnswer(Answer):
+class RefusedAnswer(AnswerPart):
     """Why a request was refused."""
 
     detail: str
