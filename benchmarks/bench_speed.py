@@ -157,7 +157,8 @@ class Run:
 def follow(machine: Machine, state: CompensatorState, fault: str, first: int, sound: FloatArray) -> Run:
     """Run a machine from a row on with a wrong speed; `sound` is the harm of the sound machine in each row [um]."""
     change, begin = FAULTS[fault], machine.rows[first][SPEED]
-    found = Run(fault, first, machine.stated[STATED[fault]])
+    never = SpeedFault(0, STATED[fault], found=0.0, minutes=0.0)  # not supervised
+    found = Run(fault, first, machine.stated.get(never.fault, never))
     last = min(int(np.searchsorted(machine.time, machine.time[first] + AFTER)), len(sound))
     for k in range(first, last):
         step, true = float(machine.time[k] - machine.time[k - 1]) / 60.0, machine.rows[k][SPEED]
