@@ -16,6 +16,16 @@ SMALLEST: dict[str, dict[str, Any]] = {
     "nc": {"SIZES": (3000, 4000), "PROVED": 3000, "ROUNDS": 1},
     "nist": {},
     "online": {},
+    "speed": {
+        "PARTS": ("virtual",),
+        "INSTANTS": 1,
+        "PHYSICS": ("linear",),
+        "SENSORS": ("six",),
+        "METHODS": ("averaged",),
+        "UPDATES": ((1, 20.0),),
+        "AFTER": 1800.0,
+        "JOBS": 3,
+    },
     "stepwise": {"N_ROWS": 300, "N_TEMPERATURES": 4},
     "volumetric": {"POINTS": 300, "EXACT_POINTS": 200},
 }
