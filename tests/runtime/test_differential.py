@@ -29,6 +29,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.fleet import Fleet
 from thermocomp.runtime.program.tables import Tables, gather
+from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
 #: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults
@@ -193,8 +194,9 @@ def test_a_replay_is_numpy_with_probings_and_bands(seed: int) -> None:
         seen, faults = run_watch(watch, time, table[:, places], stands)
         passed[:, places], failed = seen, faults != 0
         for k in np.flatnonzero(failed.any(axis=1)).tolist():
-            lost = [n for n, f in zip(watch.failing, failed[k].tolist(), strict=True) if f and n in model.sensors]
-            undriven[k] = bool(lost) and not model.may_lose(lost)
+            of = zip(watch.failing, faults[k].tolist(), strict=True)
+            lost = {n: WORDS[f] for n, f in of if f and n in model.sensors}
+            undriven[k] = bool(lost) and (not model.may_lose(lost) or bool(model.wrong_speeds(lost)))
     values = passed[:, [names.index(i.name) for i in model.inputs]]
     found = batch.run(model, limits, time, values, resting=stands, undriven=undriven, probed=probed)
     state, refused, same_so_far = own.start(), list[str](), True
