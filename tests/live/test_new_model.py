@@ -219,7 +219,8 @@ def check_new_zero(machine: Machine, begin: int, ordered: int) -> None:
     assert 1 <= known - ordered <= 16  # at a turning spindle, and at rest
     assert set(machine.words[begin:known]) == {"no zero"}
     assert set(machine.corrections[begin:known]) == {machine.corrections[begin - 1]}
-    assert set(machine.words[known:]) == {"active"}
+    # relative to a zero taken warm, the temperatures do not show the heat of the speed: it is off, and it is held
+    assert set(machine.words[known:]) <= {"active", "holding"}
     assert abs(machine.corrections[known] - machine.corrections[begin - 1]) < 0.5
     assert machine.corrections[-1] != machine.corrections[known]
 

@@ -33,6 +33,7 @@ class Warming:
         self._now = self.rest.copy()
         self._x = np.zeros(tables.sizes["SENSORS"])
         self._memory = np.zeros(tables.sizes.get("MEMORY", 0))
+        self._heat = np.zeros(tables.sizes.get("CHECKS", 0))
 
     def run(self, share: float, dt: float) -> FloatArray:
         """Return the values of all channels after a time step.
@@ -59,7 +60,15 @@ class Warming:
             lag += -np.expm1(-dt / tau) * (self._x - lag)
         states = memory[len(v["tau"]) * n :]
         states += -np.expm1(-(v["resting_rate"] + share * v["gain"]) * dt) * (share ** v["power"] - states)
-        self._x, *_ = np.linalg.lstsq(np.eye(n) - v["direct"].T, v["weight"].T @ memory, rcond=1e-6)
+        left, right = np.eye(n) - v["direct"].T, v["weight"].T @ memory
+        if len(self._heat):  # the temperatures show the heat of the speed, too
+            of = {k: np.array(self._values[k]) for k in ("heat_power", "heat_lag", "heat_direct", "heat_weight")}
+            self._heat += -np.expm1(-dt / of["heat_lag"]) * (share ** of["heat_power"] - self._heat)
+            weights = 1.0 / np.array(self._values["unseen"])
+            left = np.vstack([left, of["heat_direct"].T]) * weights[:, None]
+            lags = memory[: len(v["tau"]) * n]
+            right = np.concatenate([right, self._heat - of["heat_weight"].T @ lags]) * weights
+        self._x, *_ = np.linalg.lstsq(left, right, rcond=1e-6)
         low, high = np.array(self._values["sensor_low"]), np.array(self._values["sensor_high"])
         self._x = np.clip(self._x, low, high)
         return self._x

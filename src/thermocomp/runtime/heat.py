@@ -145,6 +145,8 @@ def advance(
     caused = find_heat(watch, np.where(np.isnan(read), found, read))
     heat = lagbank.advance(state.heat, caused, dt, watch.heat_constants.lags)
     stored = lagbank.follow(state.stored, heat, np.full(heat.shape, dt / watch.thresholds.heat_stored))
+    if dt > watch.thresholds.return_time:  # an outage: what the spindle did is known from the temperatures alone
+        heat = stored = estimate
     bank, lag = watch.bank, len(watch.bank.rates) - len(watch.bank.gain)
     share = np.minimum(np.abs(found.take(watch.state_speeds, axis=-1)) / bank.top, watch.thresholds.heat_factor)
     rates = bank.rates[lag:] + share * bank.gain

@@ -145,7 +145,7 @@ def describe(*refusals: int, answer: Any = None) -> dict[int | str, dict[str, An
 
     Parameters
     ----------
-    refusals : int
+    *refusals : int
         Status codes with which a request is refused, in addition to that for other names (400).
     answer : type, optional
         Type of the answer 200.

@@ -112,6 +112,9 @@ def advance_heats(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         heat = let("heat", find_heat(speed / t.top_speed, t.heat_power[c], t.heat_factor, t.least_share))
         s.heat[c] = follow(s.heat[c], heat, elapsed / t.heat_lag[c])
         s.stored[c] = follow(s.stored[c], s.heat[c], elapsed / t.heat_stored)
+        with when(elapsed > t.return_time):
+            s.heat[c] = s.estimate[c]
+            s.stored[c] = s.estimate[c]
     for k in each("k", t.STATES):
         share = let("share", smaller(abs(w.found_speed[t.state_speed[k]]) / t.top_speed, t.heat_factor))
         quick = let("quick", t.resting_rate[k] + share * t.gain[k])
