@@ -347,6 +347,8 @@ def _sensor_line(s: SensorExplanation, unit: str) -> str:
             f"its prediction changes by {s.moved:.1f} degC{still}"
         )
     parts += [_fault_text(f) for f in s.faults]
+    if s.faults:
+        parts.append("then the correction is held, and fades; while it is missing, another speed replaces it")
     parts.append(lost if s.runs_on else f"{lost}; the correction is held, then fades")
     return f"{s.name}: {'; '.join(parts)}{f'; spare recommended: {s.spare}' if s.spare else ''}"
 
