@@ -66,6 +66,8 @@ def test_minus_a_row_minus_a_column_is_no_test(recording: Recording, models: tup
 def test_plus_a_day_only_the_day_is_judged(recording: Recording, models: tuple[ErrorModel, ...]) -> None:
     day = small_machine(DAY, seed=5)
     long = after(recording, day)
+    # at the joint the machine is cold at once: to its watch, the speed of the second day is wrong
+    models = tuple(replace(m, watch=m.watch and replace(m.watch, checks=(), speed_faults=())) for m in models)
     (overall,) = assessing.assess(models, [long]).overall()
     assert overall.learned == 800
     assert overall.row.tolist() == list(range(800, 1600))

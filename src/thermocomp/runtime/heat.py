@@ -140,7 +140,7 @@ def advance(
 ) -> HeatState:
     """Advance heats, their estimates and the speed states; see `check`."""
     direct, lagged = watch.heat_read_out
-    estimate = used @ direct + lags @ lagged
+    estimate = np.maximum(used @ direct + lags @ lagged, 0.0)  # a spindle does not cool
     found = find_speeds(watch, state._replace(estimate=estimate), read)
     caused = find_heat(watch, np.where(np.isnan(read), found, read))
     heat = lagbank.advance(state.heat, caused, dt, watch.heat_constants.lags)

@@ -105,6 +105,7 @@ def advance_heats(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             s.estimate[c] = s.estimate[c] + s.used[i] * t.heat_direct[i, c]
         for k in each("k", t.LAGGED):
             s.estimate[c] = s.estimate[c] + s.memory[k] * t.heat_weight[k, c]
+        s.estimate[c] = larger(s.estimate[c], real(0.0))
     find_speeds(s, w, t)
     for c in each("c", t.CHECKS):
         p = let("p", t.check_speed[c])
