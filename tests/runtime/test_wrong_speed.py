@@ -121,6 +121,18 @@ def test_a_missing_speed_is_replaced_at_once_and_trusted_again_as_soon_as_it_was
     assert not gone[samples.time > until].any()
 
 
+@pytest.mark.parametrize("kind", ["zero", "far too high"])
+def test_a_speed_that_is_missing_after_it_was_wrong_is_wrong(kind: str) -> None:
+    """The models remember it: with a substitute a correction would go on from wrong states."""
+    watch, samples = fitted("linear", few=False), day("linear", 11, few=False)
+    right = samples.values[:, [c.name for c in samples.inputs].index("spindle_rpm")]
+    speed = spoil(right, 1200, kind)
+    speed[1218:] = np.nan
+    _, faults = run(watch, samples, speed)
+    assert set(faults[1230:, -1].tolist()) == {OFF}
+    assert not faults[:, :-1].any()
+
+
 def test_more_heat_than_the_speed_explains_is_cutting() -> None:
     """The temperatures rise by 30 % more; the speed is right, and so are the sensors."""
     watch, samples = fitted("linear", few=True), day("linear", 11, few=True)

@@ -118,8 +118,10 @@ def check(
     if not watch.checks:
         return state, np.zeros(read.shape, dtype=np.bool_)
     (time, dt), lost, lags = times, np.isnan(read), memory.shape[-1] - len(watch.states)
-    new = lost & (state.fault == GOOD)
-    fault = np.where(new, MISSING, state.fault).astype(np.int8)
+    new, of = lost & (state.fault == GOOD), watch.heat_constants.speeds
+    far = np.isfinite(state.since)  # a speed that was wrong just before has spoilt the states of the models
+    spoilt = np.stack([far[..., of == k].any(axis=-1) for k in range(len(watch.speeds))], axis=-1)
+    fault = np.where(new, np.where(spoilt, OFF, MISSING), state.fault).astype(np.int8)
     state = state._replace(
         fault=fault, gone=np.where(new, time, state.gone), reach=failed.astype(np.float64) @ watch.heat_reach
     )

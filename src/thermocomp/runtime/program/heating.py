@@ -60,6 +60,9 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         with when(t.deciding[k] >= 0), when(w.speed_lost[k] & s.fault[t.speed_fault[k]].equals(GOOD)):
             s.fault[t.speed_fault[k]] = MISSING
             s.gone_since[k] = w.now
+            for c in each("c", t.CHECKS):
+                with when(s.is_wrong[c] & t.check_speed[c].equals(k)):
+                    s.fault[t.speed_fault[k]] = OFF
     advance_heats(s, w, t, elapsed)
     w.doubt = False
     for k in each("k", t.SPEEDS):
