@@ -82,6 +82,7 @@ def draw_thresholds(seed: int) -> Thresholds:
     rng = np.random.default_rng((5, seed))
     usual = {row.name: row.value for row in THRESHOLDS.rows}
     drawn = {name: float(round(value * 2.0 ** rng.uniform(-1.0, 1.0), 4)) for name, value in usual.items()}
+    drawn["speed_return"] /= 20.0  # the tests are shorter than a night
     drawn["implausible"] = 2.0 * max(drawn["suspect"], drawn["suspect_first"])
     return Thresholds(**drawn)
 

@@ -133,6 +133,31 @@ def test_a_speed_that_is_missing_after_it_was_wrong_is_wrong(kind: str) -> None:
     assert not faults[:, :-1].any()
 
 
+def test_a_right_speed_that_was_wrong_is_trusted_again_after_eight_hours_with_the_spindle_turning() -> None:
+    """The command goes on for half an hour at a stopped spindle: behind an open door."""
+    watch, samples = fitted("linear", few=False), day("linear", 11, few=False)
+    right, time = samples.values[:, [c.name for c in samples.inputs].index("spindle_rpm")], samples.time
+    _, faults = run(watch, samples, np.where((time > 3.5 * 3600.0) & (time < 4.0 * 3600.0), watch.top_speed, right))
+    named = np.flatnonzero(faults[:, -1] == OFF)
+    assert 3.5 <= time[named[0]] / 3600.0 <= 4.0
+    assert 12.0 <= time[named[-1]] / 3600.0 <= 13.0
+    assert right[named[-1]] > 0.0
+    assert not faults[named[-1] + 1 :].any()
+
+
+@pytest.mark.parametrize("kind", ["zero", "half"])
+def test_a_speed_that_stays_wrong_is_not_trusted_after_a_night_at_rest(kind: str) -> None:
+    """For which two hours stand here: at rest it agrees; half the speed is then trusted until the spindle is warm."""
+    few, samples = fitted("linear", few=False), day("linear", 11, few=False)
+    watch = replace(few, thresholds=replace(few.thresholds, speed_return=3600.0))
+    right = samples.values[:, [c.name for c in samples.inputs].index("spindle_rpm")]
+    _, faults = run(watch, samples, spoil(right, 300, kind))
+    named = int(np.flatnonzero(faults[:, -1] == OFF)[0])
+    running = right[named:] >= 0.5 * watch.top_speed
+    found = faults[named:, -1][running] == OFF
+    assert np.mean(found) >= (1.0 if kind == "zero" else 0.8)
+
+
 def test_more_heat_than_the_speed_explains_is_cutting() -> None:
     """The temperatures rise by 30 % more; the speed is right, and so are the sensors."""
     watch, samples = fitted("linear", few=True), day("linear", 11, few=True)

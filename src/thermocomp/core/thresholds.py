@@ -102,6 +102,9 @@ class Thresholds:
         "a wrong speed is more likely than a failed temperature unless its squares are this many times as large",
         _HEAT,
     )
+    speed_return: float = _fixed(
+        28_800.0, "s", "a wrong speed that has agreed for so long is trusted again: the models have forgotten it", _HEAT
+    )
 
     # repetition of all temperatures
     repeat_factor: float = _fixed(

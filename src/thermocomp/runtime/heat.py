@@ -2,7 +2,7 @@
 
 State in, state out, as in `thermocomp.runtime.watch`, of which it is a part: a speed that is missing or wrong is
 replaced by the one that explains the temperatures. A missing speed is trusted again once it has agreed with them for as
-long as it was missing, at most ten minutes; a wrong one is not trusted until a restart.
+long as it was missing, at most ten minutes; a wrong one after eight hours, as soon as the spindle turns.
 """
 
 from typing import NamedTuple
@@ -35,7 +35,7 @@ class HeatState(NamedTuple):
     since: FloatArray = _EMPTY  #: (..., n_checks), start of a difference beyond its limit; nan: none [s]
     doubt: FloatArray = _EMPTY  #: (..., n_checks), start of one that cutting may explain; nan: none [s]
     gone: FloatArray = _EMPTY  #: (..., n_speeds), time at which a speed was first missing [s]
-    back: FloatArray = _EMPTY  #: (..., n_speeds), time since which a missing speed agrees; nan: it does not [s]
+    back: FloatArray = _EMPTY  #: (..., n_speeds), time since which a failed speed agrees; nan: it does not [s]
     fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watch.WORDS`
 
 
@@ -192,12 +192,19 @@ def in_doubt(watch: Watch, state: HeatState, time: float) -> BoolArray:
 
 
 def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray) -> HeatState:
-    """Trust a missing speed again once it has agreed with the temperatures for as long as it was missing."""
+    """Trust a speed again that has agreed with the temperatures for long enough.
+
+    A missing one for as long as it was missing; a wrong one until the models have forgotten it, and with the spindle
+    turning, since a speed that always reads 0 agrees all night.
+    """
+    off, of = watch.heat_constants.off, watch.heat_constants.speeds
     far = np.abs(state.heat - state.estimate) > limits(watch, state)
-    of = watch.heat_constants.speeds
-    agrees = [~far[..., of == k].any(axis=-1) for k in range(len(watch.speeds))]
-    fits = (state.fault == MISSING) & ~lost & np.stack(agrees, axis=-1)
+    speeds = range(len(watch.speeds))
+    agrees = np.stack([~far[..., of == k].any(axis=-1) for k in speeds], axis=-1)
+    turns = np.stack([(state.heat > off)[..., of == k].all(axis=-1) for k in speeds], axis=-1)
+    missing, fits = state.fault == MISSING, (state.fault != GOOD) & ~lost & agrees
     back = _begin(state.back, fits, time)
     with np.errstate(invalid="ignore"):
-        again = fits & (time - back >= np.minimum(back - state.gone, watch.thresholds.return_time))
+        absent = np.minimum(back - state.gone, watch.thresholds.return_time)
+        again = fits & (missing | turns) & (time - back >= np.where(missing, absent, watch.thresholds.speed_return))
     return state._replace(fault=np.where(again, GOOD, state.fault).astype(np.int8), back=np.where(again, np.nan, back))

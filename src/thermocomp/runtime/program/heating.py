@@ -68,6 +68,7 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     for k in each("k", t.SPEEDS):
         w.wrong[k] = False
         w.agrees[k] = True
+        w.turns[k] = True
     for c in each("c", t.CHECKS):
         p = let("p", t.check_speed[c])
         apart = let("apart", s.heat[c] - s.estimate[c])
@@ -82,6 +83,8 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         most.set(most + least)
         with when(abs(apart) > most):
             w.agrees[p] = False
+        with when(s.heat[c] <= t.off_limit[t.SENSORS + c]):
+            w.turns[p] = False
         trusted = let("trusted", s.fault[t.speed_fault[p]].equals(GOOD))
         is_wrong = let("is_wrong", trusted & (abs(apart) > most))
         with when(is_wrong & ~s.is_wrong[c]):
@@ -127,16 +130,19 @@ def advance_heats(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
 
 @procedure
 def trust_again(s: Kept, w: Work, t: Constants) -> None:
-    """Trust a missing speed again once it has agreed with the temperatures for as long as it was missing."""
+    """Trust a speed again that has agreed with the temperatures for long enough."""
     for k in each("k", t.SPEEDS):
         with when(t.deciding[k] >= 0):
             p = let("p", t.speed_fault[k])
-            fits = let("fits", s.fault[p].equals(MISSING) & ~w.speed_lost[k] & w.agrees[k])
+            missing = let("missing", s.fault[p].equals(MISSING))
+            fits = let("fits", s.fault[p].differs(GOOD) & ~w.speed_lost[k] & w.agrees[k])
             with when(fits & ~s.does_agree[k]):
                 s.agrees_since[k] = w.now
             s.does_agree[k] = fits
-            soon = let("soon", w.now - s.agrees_since[k] >= s.agrees_since[k] - s.gone_since[k])
-            with when(fits & (soon | (w.now - s.agrees_since[k] >= t.return_time))):
+            agreed = let("agreed", w.now - s.agrees_since[k])
+            soon = let("soon", (agreed >= s.agrees_since[k] - s.gone_since[k]) | (agreed >= t.return_time))
+            forgotten = let("forgotten", w.turns[k] & (agreed >= t.speed_return))
+            with when(fits & ((missing & soon) | (~missing & forgotten))):
                 s.fault[p] = GOOD
                 s.does_agree[k] = False
 

@@ -52,6 +52,7 @@ OF_WATCH = (
     "heat_stored",
     "untrained_heat",
     "speed_doubt",
+    "speed_return",
     "speed_preferred",
 )
 

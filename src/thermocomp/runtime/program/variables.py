@@ -115,7 +115,7 @@ class Kept(Record):
     is_doubtful = truths("the heat is far from its estimate, unless the machine is cutting", "CHECKS")
     doubtful_since = numbers("time since which it is [s]", "CHECKS", time=True)
     gone_since = numbers("time at which a speed was first missing [s]", "SPEEDS", time=True)
-    does_agree = truths("a missing speed agrees with the temperatures again", "SPEEDS")
+    does_agree = truths("a failed speed agrees with the temperatures again", "SPEEDS")
     agrees_since = numbers("time since which it does [s]", "SPEEDS", time=True)
 
 
@@ -181,6 +181,7 @@ class Work(Record):
     found_speed = numbers("speeds that explain the temperatures [1/min]", "SPEEDS")
     wrong = truths("the speed has been wrong for too long", "SPEEDS")
     agrees = truths("the speed agrees with the temperatures", "SPEEDS")
+    turns = truths("the spindle turns for certain", "SPEEDS")
     doubt = truth("a speed has lately become doubtful")
     speeds_rest = number("sum of squares of the residuals if the speeds are wrong")
 
@@ -324,6 +325,7 @@ class Constants(Record):
     heat_stored = threshold("heat_stored", time=True)
     untrained_heat = threshold("untrained_heat")
     speed_doubt = threshold("speed_doubt", time=True)
+    speed_return = threshold("speed_return", time=True)
     speed_preferred = threshold("speed_preferred")
 
     # sizes of arrays, and features of a compensator
