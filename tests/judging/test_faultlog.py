@@ -23,6 +23,7 @@ from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.watch import GOOD
+from thermocomp.virtual import datasets as virtual
 
 
 @pytest.fixture(scope="module")
@@ -261,3 +262,25 @@ def test_trouble_of_a_temperature_caps_the_verdict_where_no_watch_could_look() -
     (seen,), (unseen,) = (assessing.assess([model], [r], starts=Start()).overall() for r in (recording, blind))
     assert not any("t1_C" in cap for cap in seen.verdict.caps)
     assert any("data-quality problem in t1_C" in cap for cap in unseen.verdict.caps)
+
+
+def test_a_wrong_speed_holds_the_correction_and_is_given_in_its_unit() -> None:
+    (whole,) = virtual.record("demo", seed=31)
+    table = whole.to_frame().iloc[:2400]
+    table.loc[table.time_s > 6.0 * 3600.0, "spindle_rpm"] = 0.0
+    recording = Recording.from_dataframe(table, time="time_s", name="wrong")
+    samples = stack(virtual.record("demo"), ["z_um"])
+    watch = find_watch(samples, samples.cycle >= 0)
+    bare = train("averaged", samples, 0, samples.cycle >= 0).model
+    assert bare is not None
+    honest = replace(watched_model().honest_error, lost={"spindle_rpm": 1.0})  # type: ignore[type-var]
+    own = replace(bare, watch=watch, honest_error=honest)
+    judged = assessing.assess([own], [recording], starts=Start())
+    (log,) = find_faults(judged, [recording])
+    (line,) = describe_faults([log], [recording])
+    assert line.startswith("wrong: spindle_rpm off from 6.")
+    assert line.endswith("1/min on average")
+    assert own.may_lose(["spindle_rpm"])
+    wrong = find_costs(own, judged.overall()[0], [log])[-1]
+    assert wrong.failed == ("spindle_rpm",)
+    assert not wrong.runs_on

@@ -68,8 +68,8 @@ def test_what_failed_and_what_it_cost(judged: Judged, log: FaultLog, page: str) 
     assert "small" not in told
     assert "failing: 2 of 4 sensors failed, 2 did not" in told
     stepped, missing = log.faults
-    assert f"t1_C stepped {stepped.begin / 3600:.2f} h the end {stepped.beside:.2f}" in told
-    assert f"t3_C missing {missing.begin / 3600:.2f} h the end –" in told
+    assert f"t1_C stepped {stepped.begin / 3600:.2f} h the end {stepped.beside:+.1f} degC" in told
+    assert f"t3_C missing {missing.begin / 3600:.2f} h the end" in told
     for c in find_costs(watched_model(), judged.overall()[0], [log]):
         row = [", ".join(c.failed) or "none", f"{c.hours:.1f}", in_um(c.rms), in_um(c.none_rms), in_um(c.honest)]
         assert " ".join([*row, "continues" if c.runs_on else "held, then fades"]) in told

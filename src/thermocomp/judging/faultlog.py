@@ -1,4 +1,4 @@
-"""Failed temperature sensors in recordings, replacement values, and loss of accuracy, from a replay of the watch."""
+"""Failed sensors in recordings, replacement values, and loss of accuracy, from a replay of the watch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,14 +23,15 @@ IntArray = NDArray[np.int8]
 
 
 class Fault(NamedTuple):
-    """A period in which a temperature was not trusted."""
+    """A period in which a sensor was not trusted."""
 
     sensor: str
     word: str  #: missing, stepped, stuck or off (deviates from its prediction)
     begin: float  #: time of detection, on the clock of its recording [s]
     end: float  #: time when it was trusted again, or end of the recording [s]
     returned: bool  #: whether it was trusted again
-    beside: float  #: mean of its reading minus the replacement value; nan if the reading was missing [degC]
+    beside: float  #: mean of its reading minus the replacement value; nan if the reading was missing
+    unit: str  #: of the reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class FaultLog:
     fault : ndarray of int of shape (n_rows, n_sensors)
         See `thermocomp.runtime.watch.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
-        Recorded and replacement values [degC]; nan where there was none, or the sensor was trusted.
+        Recorded and replacement values [their units]; nan where there was none, or the sensor was trusted.
     faults : tuple of Fault
         In order of detection.
     """
@@ -100,12 +101,11 @@ def find_costs(model: ErrorModel, assessment: Assessment, logs: Sequence[FaultLo
     places = list(zip(assessment.test.tolist(), assessment.row.tolist(), strict=True))
     lost = {k: _lost(model, log) for k, log in own.items()}
     failed = [lost[k][row] for k, row in places]
-    driven = {names: not names or model.may_lose(names) for names in dict.fromkeys(failed)}
     steps = {k: np.diff(log.time, prepend=log.time[0]) for k, log in own.items()}
     hours = np.array([steps[k][row] for k, row in places]) / 3600
     known, found = model.honest_error, list[Cost]()
-    for names, runs_on in driven.items():
-        rows = np.array([f == names for f in failed], dtype=np.bool_)
+    for names, runs_on in dict.fromkeys(failed):
+        rows = np.array([f == (names, runs_on) for f in failed], dtype=np.bool_)
         honest = None if known is None else known.lost.get(", ".join(names)) if names else known.rms
         measured = assessment.measured[rows]
         left, none = rms(measured, assessment.predicted[rows]), rms(measured, np.zeros_like(measured))
@@ -144,6 +144,7 @@ def _log(watch: Watch, samples: Samples, test: int, recording: Recording) -> Fau
             end=float(recording.time[min(b, len(recording) - 1)]),
             returned=b < len(recording) and fault[b, j] == GOOD,
             beside=float("nan") if fault[a, j] == MISSING else float(np.nanmean(read[a:b, j] - stood_in[a:b, j])),
+            unit=watch.inputs[heat[j]].unit,
         )
         for j, name in enumerate(watch.failing)
         for a, b in _runs(fault[:, j])
@@ -169,10 +170,13 @@ def _runs(fault: IntArray) -> Iterator[tuple[int, int]]:
             yield a, b
 
 
-def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[str, ...]]:
-    """Return the failed sensors of a model in each row, in the order of its inputs."""
+def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[tuple[str, ...], bool]]:
+    """Return the failed sensors of a model in each row, in the order of its inputs, and whether it runs without."""
     own = [i.name for i in model.inputs if i.name in model.sensors and i.name in log.watch.failing]
-    lost = log.fault[:, [log.watch.failing.index(n) for n in own]] != GOOD
-    cases, which = np.unique(lost, axis=0, return_inverse=True)
-    named = [tuple(n for n, gone in zip(own, case, strict=True) if gone) for case in cases.tolist()]
-    return [named[k] for k in which.ravel().tolist()]
+    faults = log.fault[:, [log.watch.failing.index(n) for n in own]]
+    cases, which = np.unique(faults, axis=0, return_inverse=True)
+    found = list[tuple[tuple[str, ...], bool]]()
+    for case in cases.tolist():
+        failed = {n: WORDS[fault] for n, fault in zip(own, case, strict=True) if fault != GOOD}
+        found.append((tuple(failed), not failed or (model.may_lose(failed) and not model.wrong_speeds(failed))))
+    return [found[k] for k in which.ravel().tolist()]

@@ -25,7 +25,7 @@ TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": 
 MOST, ROWS = 6, 40
 #: maximum number of failures of a recording shown on the terminal
 TOLD = 8
-#: distance from the substitute beyond which readings are not drawn [degC]
+#: distance from the substitute, beyond the range of the trusted values, from which readings are not drawn
 AROUND = 5.0
 
 TITLE = "Sensors"
@@ -62,7 +62,8 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     if cautions:
         limits = judged.overall()[0].limits or Limits()
         parts.append(
-            "'Held, then fades': without these sensors the model was never judged, or does harm. Its correction is "
+            "'Held, then fades': without these sensors the model was never judged, or does harm, or it remembers a "
+            "speed from before it was found to be wrong. Its correction is "
             f"held for {limits.hold / 60:g} min, then decays to zero with a time constant of {limits.fade / 3600:g} h; "
             "the results here and above include this."
         )
@@ -75,14 +76,16 @@ def describe_faults(logs: Sequence[FaultLog], recordings: Sequence[Recording]) -
         for f in log.faults[:TOLD]:
             recording = recordings[log.recording]
             until = f"to {_when(f.end, recording)}" if f.returned else "to the end"
-            beside = (
-                f"; its reading minus its substitute value was {f.beside:+.1f} degC on average"
-                if math.isfinite(f.beside)
-                else ""
-            )
+            beside = f"; its reading minus its substitute value was {_beside(f)} on average" if _beside(f) else ""
             yield f"{log.name}: {f.sensor} {f.word} from {_when(f.begin, recording)} {until}{beside}"
         if len(log.faults) > TOLD:
             yield f"{log.name}: {len(log.faults) - TOLD} more failures are listed on the page that -o writes"
+
+
+def _beside(fault: Fault) -> str:
+    """Return the mean of the reading minus the substitute, with its unit; empty if the reading was missing."""
+    decimals = 1 if fault.unit == "degC" else 0
+    return f"{fault.beside:+.{decimals}f} {fault.unit}" if math.isfinite(fault.beside) else ""
 
 
 def describe_held(judged: Judged, logs: Sequence[FaultLog]) -> Iterator[str]:
@@ -159,11 +162,10 @@ def draw_stand_ins(log: FaultLog) -> Drawn:
             ax.plot(hours, log.read[step, k], color=MEASURED, lw=1.4, label="reading")
             ax.plot(hours, log.stood_in[step, k], color=PREDICTED, ls="--", lw=1.6, label="substitute value")
             ax.set_title(shorten(name, LONGEST), fontsize=8)
+            ax.set_ylabel(log.watch.inputs[log.watch.supervised[k]].unit)
             ax.set_ylim(*_around(log.read[:, k], log.stood_in[:, k]))
             ax.set_xlim(float(log.time[0]) / 3600, float(log.time[-1]) / 3600)
             ax.set_xlabel("time [h]")
-        for ax in panels[:, 0]:
-            ax.set_ylabel("degC")
         add_legend(figure, loc="outside upper left", ncols=2)
         return svg(figure)
 
@@ -193,7 +195,8 @@ def _stand_in_words(log: FaultLog) -> str:
     more = f" Not drawn: {', '.join(log.failed[MOST:])}." if len(log.failed) > MOST else ""
     return (
         "The substitute value starts at the last value of the sensor, and approaches its prediction from the other "
-        f"sensors and the speed with a time constant of an hour.{more}"
+        "sensors and the speed with a time constant of an hour; that of a speed is the one that explains the "
+        f"temperatures.{more}"
     )
 
 
@@ -203,7 +206,7 @@ def _fault_table(log: FaultLog, recording: Recording) -> Layout:
         Column("fault", lambda f: f.word),
         Column("detected", lambda f: _when(f.begin, recording), ">"),
         Column("until", lambda f: _when(f.end, recording) if f.returned else "the end", ">"),
-        Column("reading minus substitute, mean", lambda f: f.beside, "um", "degC"),
+        Column("reading minus substitute, mean", _beside, ">"),
     )
     more = len(log.faults) - ROWS
     note = f"{more} more are not listed." if more > 0 else ""
