@@ -5,7 +5,6 @@ import json
 import random
 import time
 from collections.abc import Callable, Mapping
-from datetime import datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,9 +15,9 @@ import paho.mqtt.publish as publisher
 import pytest
 from broker import Mosquitto
 from shopfloor import Machine, Service, model, undisturbed
+from spoiledstates import SPOILED
 
-from thermocomp.files import jsonfile, modelfile
-from thermocomp.live import statefile
+from thermocomp.files import modelfile
 
 #: time-lapse factor, and rate in seconds of the world [um/s]
 FACTOR, RATE = 60.0, 3.0
@@ -76,21 +75,6 @@ async def listen(port: int, heard: list[Heard]) -> None:
             await asyncio.sleep(0.05)
 
 
-def cut(state: Path, _: Mosquitto) -> None:
-    state.write_bytes(state.read_bytes()[: state.stat().st_size // 2])
-
-
-def date_back(state: Path, _: Mosquitto) -> None:
-    (entry,) = json.loads(state.read_text())["models"]
-    entry["written"] = (datetime.fromisoformat(entry["written"]) - timedelta(days=2)).isoformat()
-    state.write_text(jsonfile.pack(statefile.KIND, [entry]))
-
-
-def of_others(state: Path, _: Mosquitto) -> None:
-    (entry,) = json.loads(state.read_text())["models"]
-    state.write_text(jsonfile.pack(statefile.KIND, [entry | {"models": "others"}]))
-
-
 def restart(_: Path, broker: Mosquitto) -> None:
     broker.kill()
     broker.start()
@@ -103,20 +87,16 @@ def clear(_: Path, broker: Mosquitto) -> None:
 #: what happens while the service does not run, and whether it runs on afterwards
 CASES: Mapping[str, tuple[Callable[[Path, Mosquitto], None], bool]] = {
     "nothing": (lambda _state, _broker: None, True),
-    "missing": (lambda state, _broker: state.unlink(), False),
-    "cut": (cut, False),
-    "of another model": (of_others, False),
-    "of another day": (date_back, False),
     "broker restarted": (restart, True),
     "no retained message": (clear, True),
-}
+} | {name: (lambda state, _, spoil=spoil: spoil(state), False) for name, spoil in SPOILED.items()}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_restart_is_no_step_and_is_sound_or_held(case: str, tmp_path: Path) -> None:
     spoil, runs = CASES[case]
-    kills, rng, broker = 20 if runs else 5, random.Random(case), Mosquitto(tmp_path)
+    rng, broker = random.Random(case), Mosquitto(tmp_path)
     broker.start()
     modelfile.write([model()], tmp_path / "model.json")
     config, service, machine = tmp_path / "serve.toml", Service(tmp_path), Machine(broker.port, FACTOR)
@@ -133,7 +113,7 @@ def test_a_restart_is_no_step_and_is_sound_or_held(case: str, tmp_path: Path) ->
         machine.start()
         await asyncio.sleep(45.0)
         configure("order")
-        for _ in range(kills):
+        for _ in range(20):
             await asyncio.to_thread(service.kill)
             await asyncio.to_thread(spoil, tmp_path / "state.json", broker)
             service.start()
