@@ -1,8 +1,9 @@
 """The watch as machine code of the program finds what the watch in numpy finds."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from watchedmachine import failing
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.watch import Watch
 from thermocomp.judging import watchrun
+from thermocomp.judging.compiled import machine
 from thermocomp.judging.compiled.machine import run
 from thermocomp.judging.watchrun import run_watch
 from thermocomp.models.watching import find_watch
@@ -134,6 +136,19 @@ def test_wrong_speeds_are_found_alike(kind: str, machine: Callable[[], tuple[Wat
         found |= set(check(samples.time[mine], wrong[mine], samples.stands[mine], None, watch)[:, -1])
     assert found & {1, 4} or machine is watched
     assert machine is watched or kind == "zero, gone" or (1 if kind == "gone" else 4) in found
+
+
+def test_threads_that_begin_at_once_share_one_machine_code() -> None:
+    """Of a second one, compiled at the same time, a thread would run what the other had discarded."""
+    watch, samples = six()
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]]
+    compiled = Mock(wraps=machine.compile_module)
+    machine._engine.cache_clear()
+    machine._compiled.cache_clear()
+    with patch.object(machine, "compile_module", compiled), ThreadPoolExecutor(8) as threads:
+        found = list(threads.map(lambda _: run_watch(watch, samples.time, values, samples.stands)[1], range(8)))
+    assert compiled.call_count == 1
+    assert not np.any(found)
 
 
 def test_a_start_with_a_turning_spindle_is_alike() -> None:

@@ -1,6 +1,7 @@
 """Procedures of a compensator's program, compiled to machine code of this computer."""
 
 import ctypes
+import threading
 from collections.abc import Callable
 from functools import cache
 
@@ -9,6 +10,9 @@ import llvmlite.binding as llvm
 from thermocomp.judging.compiled import rows
 from thermocomp.judging.compiled.intermediate import write_module
 from thermocomp.runtime.program.memory import ARRAYS, FlatMemory
+
+#: threads that compile at once would discard all machine code but the last, while they run it
+_ONE = threading.Lock()
 
 
 def compile_module(text: str, effort: int = 2) -> llvm.ExecutionEngine:
@@ -38,4 +42,6 @@ def _compiled(name: str) -> Callable[..., None]:
 
 def run(procedure: Callable[..., None], memory: FlatMemory) -> None:
     """Run a procedure of `thermocomp.judging.compiled.rows` on the variables of a compensator."""
-    _compiled(procedure.__name__)(*(memory.arrays[name].ctypes.data for name in ARRAYS))
+    with _ONE:
+        found = _compiled(procedure.__name__)
+    found(*(memory.arrays[name].ctypes.data for name in ARRAYS))
