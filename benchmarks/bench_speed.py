@@ -30,6 +30,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.recordings.recording import Recording
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState
+from thermocomp.runtime.watch import UNSURE
 from thermocomp.virtual.protocol import Physics
 
 FloatArray = NDArray[np.float64]
@@ -236,8 +237,13 @@ def show(runs: Sequence[Run], few: bool, goal: float) -> bool:
     return all(goods)
 
 
-def sound(title: str, model: ErrorModel, tests: Sequence[Recording], per: int, every: float) -> bool:
-    """Run sound machines whose source repeats its values; print and return whether nothing was said."""
+def sound(
+    title: str, model: ErrorModel, tests: Sequence[Recording], per: int, every: float, *, moving: bool = False
+) -> bool:
+    """Run sound machines whose source repeats its values; print and return whether nothing was said.
+
+    Near axes that move, temperatures may be unexplained.
+    """
     alarms, active = Counter[str](), list[bool]()
     for test in tests:
         machine, words = Machine.of(model, test), set[str]()
@@ -251,7 +257,7 @@ def sound(title: str, model: ErrorModel, tests: Sequence[Recording], per: int, e
     share, hours = float(np.mean(active)), sum(float(t.time[-1]) for t in tests) / 3600.0
     told = ", ".join(f"{w} (in {n} of {len(tests)} tests)" for w, n in alarms.items()) or "none"
     print(f"  {title}, {per} readings per update, {hours:.0f} h: false alarms {told}; active {share:.2%}", flush=True)
-    return not alarms and share >= ACTIVE
+    return not any(w for w in alarms if not (moving and w.endswith(UNSURE))) and share >= ACTIVE
 
 
 def freeze(model: ErrorModel, test: Recording, count: int) -> bool:
@@ -321,7 +327,7 @@ def healthy(_: int) -> bool:
             for per, every in UPDATES:
                 reached &= sound("in air", model, quiet, per, every)
                 reached &= sound("up to 30 % more heat", model, hot, per, every)
-            sound("moving axes (no goal)", model, moving, 1, 20.0)
+            reached &= sound("moving axes", model, moving, 1, 20.0, moving=True)
     return reached
 
 

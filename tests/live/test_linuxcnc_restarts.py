@@ -24,7 +24,7 @@ SPREAD = 1.5 * RATE
 #: half an hour of the machine, in seconds of the world
 SOON = 1800.0 / FACTOR
 #: two values are read at most so much closer together than apart [s]
-JITTER = 0.05
+JITTER = 0.2
 
 #: what happens to the state while the service does not run; it runs on after nothing only
 CASES: dict[str, Callable[[Path], None]] = {"nothing": lambda _: None, **SPOILED}

@@ -85,8 +85,8 @@ def find_limits(
 ) -> FloatArray:
     """Return the largest permitted difference of heats from their estimates, (..., n_checks).
 
-    It is larger where the spindle is hotter than its speed explains, since cutting heats it as well, and where a speed
-    exceeds those of the training.
+    It is larger where the spindle is hotter than its speed explains, since cutting heats it as well, where a speed
+    exceeds those of the training, and while it turns, since bearings that are warm from elsewhere have less friction.
 
     Parameters
     ----------
@@ -97,6 +97,6 @@ def find_limits(
     stored : ndarray of shape (..., n_checks)
         The same after a further lag: heat of cutting leaves the spindle slowly.
     """
-    untrained = thresholds.untrained_heat * np.maximum(heat - 1.0, 0.0)
+    untrained = thresholds.untrained_heat * np.maximum(heat - 1.0, 0.0) + thresholds.less_heat * heat
     cutting = np.maximum(thresholds.more_heat * heat, thresholds.more_stored * stored) * np.minimum(of.powers, 1.0)
     return np.asarray(of.off + np.where(difference > 0.0, untrained, cutting))

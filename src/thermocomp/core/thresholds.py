@@ -90,6 +90,9 @@ class Thresholds:
     )
     more_stored: float = _fixed(0.25, "", "the same for heat that is left in the spindle", _HEAT)
     heat_stored: float = _fixed(1800.0, "s", "time constant with which heat of cutting leaves the spindle", _HEAT)
+    less_heat: float = _fixed(
+        0.2, "", "axes that move warm the bearings of the spindle, whose friction then falls by up to this share", _HEAT
+    )
     untrained_heat: float = _fixed(
         0.5, "", "share of the heat above that at the trained top speed by which the estimate may be wrong", _HEAT
     )
@@ -101,6 +104,9 @@ class Thresholds:
         "",
         "a wrong speed is more likely than a failed temperature unless its squares are this many times as large",
         _HEAT,
+    )
+    swap_preferred: float = _fixed(
+        6.0, "", "a swap must leave residuals whose squares are this many times smaller than one failure does", _WATCH
     )
     speed_return: float = _fixed(
         28_800.0, "s", "a wrong speed that has agreed for so long is trusted again: the models have forgotten it", _HEAT

@@ -26,7 +26,7 @@ class Fault(NamedTuple):
     """A period in which a sensor was not trusted."""
 
     sensor: str
-    word: str  #: missing, stepped, stuck or off (deviates from its prediction)
+    word: str  #: see `thermocomp.runtime.watch.WORDS`
     begin: float  #: time of detection, on the clock of its recording [s]
     end: float  #: time when it was trusted again, or end of the recording [s]
     returned: bool  #: whether it was trusted again

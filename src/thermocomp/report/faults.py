@@ -20,7 +20,14 @@ from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
 
 #: colours by kind of failure
-TINTS = {"missing": "#56B4E9", "stepped": "#D55E00", "stuck": "#CC79A7", "off": "#E69F00", "swapped": "#009E73"}
+TINTS = {
+    "missing": "#56B4E9",
+    "stepped": "#D55E00",
+    "stuck": "#CC79A7",
+    "off": "#E69F00",
+    "swapped": "#009E73",
+    "unexplained": "#F0E442",
+}
 #: maximum number of sensors of a recording whose substitutes are drawn, and of failures in a table
 MOST, ROWS = 6, 40
 #: maximum number of failures of a recording shown on the terminal

@@ -3,8 +3,9 @@
 State in, state out; leading array axes are a batch of independent runs with the same clock. Only past readings are
 used. A missing sensor is replaced immediately by its prediction from the other sensors and the speed; a sensor that has
 jumped, is stuck or deviates, as soon as this is certain. A substitute starts at the last value of the sensor and moves
-to the prediction, so that there is no jump. A missing sensor is trusted again when it agrees with its prediction; other
-failed sensors are not trusted until a restart, since they must be repaired.
+to the prediction, so that there is no jump. A missing sensor is trusted again when it agrees with its prediction. So is
+one with an unexplained deviation, which may be due to heat near it that the training did not contain, as of a moving
+axis. Other failed sensors are not trusted until a restart, since they must be repaired.
 """
 
 from typing import NamedTuple
@@ -25,8 +26,10 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
 #: states of a sensor, by `WatchState.fault`
-WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped")
-GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED = range(len(WORDS))
+WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped", "unexplained")
+GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED, UNEXPLAINED = range(len(WORDS))
+#: no failure of a sensor for certain
+UNSURE = WORDS[UNEXPLAINED]
 
 
 class WatchState(NamedTuple):
@@ -49,7 +52,7 @@ class WatchState(NamedTuple):
     still: FloatArray  #: start of the constant reading [s]
     then: FloatArray  #: prediction at that time [degC]
     moving: FloatArray  #: time since which its prediction has moved too far for a constant reading; nan: it has not [s]
-    back: FloatArray  #: time since which a missing sensor agrees with its prediction; nan: it does not [s]
+    back: FloatArray  #: time since which one that may return agrees with its prediction; nan: it does not [s]
     evidence: FloatArray  #: (..., n_pairs), low-passed evidence that two are swapped; -inf: excluded
     fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
     heat: HeatState = HeatState()  #: supervision of the speeds
@@ -320,7 +323,7 @@ def _blame(
     one = one_fails(watch, np.where(able, x - x @ direct - s.memory @ states, 0.0), able)
     rest = np.minimum(one.rest, speeds_fail(watch, x, s.memory, able, s.heat))
     doubt = heat.in_doubt(watch, s.heat, s.time) & ~speeds.any(axis=-1)  # then no temperature is excluded
-    pair = (both.worst <= 1.0) & (both.rest < rest)
+    pair = (both.worst <= 1.0) & (watch.thresholds.swap_preferred * both.rest < rest)
     swapped = (lasting | (stepped | stuck).any(axis=-1)) & ~doubt & pair
     s = _fail(watch, s, swapped[..., None] & both.sensors, SWAPPED, np.zeros(x.shape))
     for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
@@ -335,7 +338,7 @@ def _blame(
         s = s._replace(heat=supervised, memory=memory, off=np.where(fails.any(axis=-1, keepdims=True), np.nan, s.off))
     # otherwise no single failure explains the residuals: the machine is unlike its training
     sure = lasting & alone & ~slow & ~doubt & (one.worst <= 1.0)
-    return _fail(watch, s, sure[..., None] & one.sensors, OFF, np.zeros(x.shape))
+    return _fail(watch, s, sure[..., None] & one.sensors, UNEXPLAINED, np.zeros(x.shape))
 
 
 def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
@@ -347,13 +350,15 @@ def _fast(watch: Watch, s: WatchState, change: FloatArray) -> FloatArray:
 
 
 def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
-    """Trust a missing sensor again once it agrees with its prediction."""
+    """Trust a missing or unexplained sensor again once it agrees with its prediction."""
+    missing = s.fault == MISSING
     with np.errstate(invalid="ignore"):
-        fits = (s.fault == MISSING) & (np.abs(difference) <= watch.limits("off"))
+        fits = (missing | (s.fault == UNEXPLAINED)) & (np.abs(difference) <= watch.limits("off"))
         if not fits.any():
             return s._replace(back=np.full(fits.shape, np.nan))
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
-        again = fits & (s.time - back >= watch.thresholds.return_time)
+        wait = np.where(missing, watch.thresholds.return_time, watch.thresholds.fault_rest)
+        again = fits & (s.time - back >= wait)
     return s._replace(
         fault=np.where(again, GOOD, s.fault).astype(np.int8),
         since=np.where(again, np.nan, s.since),
@@ -381,5 +386,5 @@ def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: Flo
         bridge=np.where(found, offset, s.bridge),
         used=np.where(found, s.predicted + offset, s.used),
         jumped=np.where(found, np.nan, s.jumped),
-        off=np.where(found.any(axis=-1, keepdims=True) & (fault in (OFF, SWAPPED)), np.nan, s.off),
+        off=np.where(found.any(axis=-1, keepdims=True) & (fault in (UNEXPLAINED, SWAPPED)), np.nan, s.off),
     )

@@ -135,7 +135,10 @@ FUNCTION(_)
 {moves}}}
 """
 
-_FAULTS = "pin out s32 fault-#[{sensors}];         /* 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped */\n"
+_FAULTS = (
+    "pin out s32 fault-#[{sensors}];         "
+    "/* 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped, 6 unexplained */\n"
+)
 _TOLD = """        for (k = 0; k < {sensors}; k++) {{
             fault(k) = state.fault[k];
         }}

@@ -11,6 +11,7 @@ from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
 from thermocomp.runtime.lines import DeviationLine
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN
+from thermocomp.runtime.watch import UNSURE
 
 #: states of a target, the one that needs attention most first
 ORDER = (
@@ -83,7 +84,8 @@ def find_alarms(service: Service) -> Iterator[str]:
         silent = said.rejected.startswith("no reading")
         yield said.rejected if silent else f"the last reading was rejected: {said.rejected}"
     for name, fault in (said.failed if said else {}).items():
-        yield f"{name} {fault}"
+        if fault != UNSURE:  # heat of a moving axis is no failure
+            yield f"{name} {fault}"
     if service.keeper.not_saved and service.keeper.configured:
         yield f"the state is not saved: {service.keeper.not_saved}"
     if service.recorder is not None and (trouble := service.recorder.journal.status().reason):

@@ -5,7 +5,7 @@ from thermocomp.runtime.program.language import choose, each, let, procedure, wh
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, Whole, flag, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, OFF, STEPPED, STUCK, SWAPPED
+from thermocomp.runtime.watch import GOOD, STEPPED, STUCK, SWAPPED, UNEXPLAINED
 
 
 @procedure
@@ -27,11 +27,14 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         w.doubt = w.doubt & ~slow
     with when(w.lasting | alone | slow):
         find_one(s, w, t)
-        pair = let("pair", (w.both >= 0) & (w.both_worst <= 1.0) & ((w.one < 0) | (w.both_rest < w.one_rest)))
+        pair = let(
+            "pair",
+            (w.both >= 0) & (w.both_worst <= 1.0) & ((w.one < 0) | (t.swap_preferred * w.both_rest < w.one_rest)),
+        )
         swapped = let("swapped", pair)
         with when(t.supervised):
             heating.weigh_speeds(s, w, t)
-            pair.set(pair & (w.both_rest < w.speeds_rest))
+            pair.set(pair & (t.swap_preferred * w.both_rest < w.speeds_rest))
             swapped.set(pair & ~w.doubt & (w.lasting | alone))
         with when(swapped):
             for i in each("i", t.SENSORS):
@@ -68,7 +71,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             for i in each("i", t.SENSORS):
                 w.failing[i] = i.equals(w.one)
                 w.onset[i] = 0.0
-            w.new_fault = OFF
+            w.new_fault = UNEXPLAINED
             fail(s, w, t)
 
 
@@ -174,6 +177,6 @@ def fail(s: Kept, w: Work, t: Constants) -> None:
             s.bridge[i] = w.onset[i]
             s.used[i] = s.predicted[i] + w.onset[i]
             s.has_jumped[i] = False
-    with when(fails & (w.new_fault.equals(OFF) | w.new_fault.equals(SWAPPED))):
+    with when(fails & (w.new_fault.equals(UNEXPLAINED) | w.new_fault.equals(SWAPPED))):
         for i in each("i", t.SENSORS):
             s.is_off[i] = False

@@ -72,7 +72,7 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     for c in each("c", t.CHECKS):
         p = let("p", t.check_speed[c])
         apart = let("apart", s.heat[c] - s.estimate[c])
-        most = let("most", t.untrained_heat * larger(s.heat[c] - 1.0, real(0.0)))
+        most = let("most", t.untrained_heat * larger(s.heat[c] - 1.0, real(0.0)) + t.less_heat * s.heat[c])
         with when(apart <= 0.0):
             cutting = let("cutting", larger(t.more_heat * s.heat[c], t.more_stored * s.stored[c]))
             most.set(cutting * smaller(t.heat_power[c], real(1.0)))

@@ -52,7 +52,9 @@ OF_WATCH = (
     "heat_stored",
     "untrained_heat",
     "speed_doubt",
+    "less_heat",
     "speed_return",
+    "swap_preferred",
     "speed_preferred",
 )
 

@@ -52,7 +52,9 @@ class Kept(Record):
         "why the reading was not used: 0 used, 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped"
     )
     outside = whole("number of inputs beyond the trained range")
-    fault = wholes("state of each sensor: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped", "FAILING")
+    fault = wholes(
+        "state of each sensor: 0 good, 1 missing, 2 stepped, 3 stuck, 4 off, 5 swapped, 6 unexplained", "FAILING"
+    )
 
     # repetition of all temperatures: see `thermocomp.runtime.feed.FeedState`
     counter = number("last number of a reading; 0: they are not numbered", time=True)
@@ -325,7 +327,9 @@ class Constants(Record):
     heat_stored = threshold("heat_stored", time=True)
     untrained_heat = threshold("untrained_heat")
     speed_doubt = threshold("speed_doubt", time=True)
+    less_heat = threshold("less_heat")
     speed_return = threshold("speed_return", time=True)
+    swap_preferred = threshold("swap_preferred")
     speed_preferred = threshold("speed_preferred")
 
     # sizes of arrays, and features of a compensator

@@ -16,7 +16,7 @@ from thermocomp.runtime.program.language import (
 from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, MISSING, OFF
+from thermocomp.runtime.watch import GOOD, MISSING, OFF, UNEXPLAINED
 
 HOLDING = 2
 
@@ -290,13 +290,15 @@ def find_off(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def believe_again(s: Kept, w: Work, t: Constants) -> None:
-    """Trust a missing sensor again once its readings agree with the prediction."""
+    """Trust a missing or unexplained sensor again once its readings agree with the prediction."""
     for i in each("i", t.SENSORS):
-        fits = let("fits", s.fault[i].equals(MISSING) & w.there[i] & (abs(w.difference[i]) <= t.off_limit[i]))
+        missing = let("missing", s.fault[i].equals(MISSING))
+        may = let("may", missing | s.fault[i].equals(UNEXPLAINED))
+        fits = let("fits", may & w.there[i] & (abs(w.difference[i]) <= t.off_limit[i]))
         with when(fits & ~s.is_back[i]):
             s.back[i] = w.now
         s.is_back[i] = fits
-        with when(fits & (w.now - s.back[i] >= t.return_time)):
+        with when(fits & (w.now - s.back[i] >= choose(missing, t.return_time, t.fault_rest))):
             s.fault[i] = GOOD
             s.usual[i] = w.difference[i]
             s.used[i] = s.predicted[i] + w.difference[i]
