@@ -106,7 +106,13 @@ class Thresholds:
         _HEAT,
     )
     swap_preferred: float = _fixed(
-        6.0, "", "a swap must leave residuals whose squares are this many times smaller than one failure does", _WATCH
+        2.0, "", "a swap must leave residuals whose squares are this many times smaller than one failure does", _WATCH
+    )
+    swap_certain: float = _fixed(
+        6.0,
+        "",
+        "the same for a swap to be certain: heat near two sensors that was not recorded may resemble one",
+        _WATCH,
     )
     speed_return: float = _fixed(
         28_800.0, "s", "a wrong speed that has agreed for so long is trusted again: the models have forgotten it", _HEAT

@@ -325,7 +325,9 @@ def _blame(
     doubt = heat.in_doubt(watch, s.heat, s.time) & ~speeds.any(axis=-1)  # then no temperature is excluded
     pair = (both.worst <= 1.0) & (watch.thresholds.swap_preferred * both.rest < rest)
     swapped = (lasting | (stepped | stuck).any(axis=-1)) & ~doubt & pair
-    s = _fail(watch, s, swapped[..., None] & both.sensors, SWAPPED, np.zeros(x.shape))
+    certain = watch.thresholds.swap_certain * both.rest < rest
+    for mine, fault in ((swapped & certain, SWAPPED), (swapped & ~certain, UNEXPLAINED)):
+        s = _fail(watch, s, mine[..., None] & both.sensors, fault, np.zeros(x.shape))
     for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
         s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
     calm = able & np.isnan(s.jumped)

@@ -37,11 +37,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             pair.set(pair & (t.swap_preferred * w.both_rest < w.speeds_rest))
             swapped.set(pair & ~w.doubt & (w.lasting | alone))
         with when(swapped):
-            for i in each("i", t.SENSORS):
-                w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
-                w.onset[i] = 0.0
-            w.new_fault = SWAPPED
-            fail(s, w, t)
+            fail_both(s, w, t)
         for i in each("i", t.SENSORS):
             w.failing[i] = w.stepped[i] & ~swapped & s.fault[i].equals(GOOD)
             w.onset[i] = s.usual[i]
@@ -73,6 +69,21 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
                 w.onset[i] = 0.0
             w.new_fault = UNEXPLAINED
             fail(s, w, t)
+
+
+@procedure
+def fail_both(s: Kept, w: Work, t: Constants) -> None:
+    """Exclude the two sensors whose swap explains the differences: swapped for certain, or else unexplained."""
+    for i in each("i", t.SENSORS):
+        w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
+        w.onset[i] = 0.0
+    certain = let("certain", (w.one < 0) | (t.swap_certain * w.both_rest < w.one_rest))
+    with when(t.supervised):
+        certain.set(certain & (t.swap_certain * w.both_rest < w.speeds_rest))
+    w.new_fault = UNEXPLAINED
+    with when(certain):
+        w.new_fault = SWAPPED
+    fail(s, w, t)
 
 
 @procedure

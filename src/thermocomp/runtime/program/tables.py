@@ -55,6 +55,7 @@ OF_WATCH = (
     "less_heat",
     "speed_return",
     "swap_preferred",
+    "swap_certain",
     "speed_preferred",
 )
 

@@ -330,6 +330,7 @@ class Constants(Record):
     less_heat = threshold("less_heat")
     speed_return = threshold("speed_return", time=True)
     swap_preferred = threshold("swap_preferred")
+    swap_certain = threshold("swap_certain")
     speed_preferred = threshold("speed_preferred")
 
     # sizes of arrays, and features of a compensator
