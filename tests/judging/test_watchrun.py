@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cache
 from unittest.mock import Mock, patch
 
@@ -21,7 +22,7 @@ from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.program.memory import FlatMemory
-from thermocomp.runtime.watch import begin, look
+from thermocomp.runtime.watch import SWAPPED, UNEXPLAINED, begin, look
 from thermocomp.virtual import datasets as virtual
 
 SIX = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")
@@ -38,10 +39,10 @@ def watched() -> tuple[Watch, Samples]:
 
 
 @cache
-def six() -> tuple[Watch, Samples]:
+def six(rezero: bool = True) -> tuple[Watch, Samples]:
     """Return six temperatures of the virtual machine: enough for swaps to be told from single failures."""
     whole = stack(virtual.record("demo"), ["z_um"])
-    samples = whole.take(np.arange(len(whole)) % 3 == 0).only([*SIX, "spindle_rpm"])
+    samples = replace(whole.take(np.arange(len(whole)) % 3 == 0).only([*SIX, "spindle_rpm"]), rezero=rezero)
     watch = find_watch(samples, samples.cycle != 3)
     assert watch is not None
     return watch, samples
@@ -112,6 +113,21 @@ def test_failures_of_a_day_are_found_alike(kind: str, begin_at: int) -> None:
         values[later, one] = values[begin_at, one]
     faults = check(samples.time, values, samples.stands, None, watch)
     assert faults.any() == (kind != "none")
+
+
+@pytest.mark.parametrize(
+    ("rezero", "pair", "expected"), [(True, [0, 2], SWAPPED), (False, [0, 3], SWAPPED), (False, [1, 5], UNEXPLAINED)]
+)
+def test_two_sensors_swapped_from_the_start_are_found_alike(rezero: bool, pair: list[int], expected: int) -> None:
+    """Not all swaps are certain."""
+    watch, samples = six(rezero)
+    places = [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]
+    values = samples.values[:1200, places].copy()
+    zero = values[:20].mean(axis=0) if rezero else np.zeros(len(places))
+    values[:, pair] = (values - zero)[:, pair[::-1]] + zero[pair]
+    faults = check(samples.time[:1200], values, samples.stands[:1200], None, watch)
+    assert set(faults[:, pair].ravel().tolist()) == {0, expected}
+    assert len(set((faults[:, pair] != 0).argmax(axis=0).tolist())) == 1  # at once
 
 
 @pytest.mark.parametrize("rows", range(4, 100, 6))

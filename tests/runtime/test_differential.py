@@ -35,7 +35,7 @@ FloatArray = NDArray[np.float64]
 #: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults
 #: that the others do not: in the return of a sensor, in the rate of a fade, and in the exclusion of swaps; 27 and 31
 #: add speeds that are wrong or missing, and a swap
-SHORT, LONG = ((*range(1, 14), 27, 31, 34, 38, 42), 640), (range(1000, 1200), 5000)
+SHORT, LONG = ((*range(1, 14), 27, 31, 34, 38, 42, 102, 129), 640), (range(1000, 1200), 5000)
 #: of an ordinary run in structured text
 IN_TEXT = (range(1, 6), 200)
 #: smallest difference that counts [um]
@@ -169,7 +169,7 @@ def test_the_draws_contain_what_matters() -> None:
         in_text |= {m.family for m in tables.models if seed in IN_TEXT[0]}
     assert families == in_text == set(FAMILIES)
     assert len(policies) == 6
-    assert (statuses, faults, codes) == (set(range(5)), set(range(6)), set(range(5)))
+    assert (statuses, faults, codes) == (set(range(5)), set(range(7)), set(range(5)))
 
 
 def only_later(stream: Stream) -> tuple[FloatArray, FloatArray]:
