@@ -91,7 +91,7 @@ class Thresholds:
     more_stored: float = _fixed(0.25, "", "the same for heat that is left in the spindle", _HEAT)
     heat_stored: float = _fixed(1800.0, "s", "time constant with which heat of cutting leaves the spindle", _HEAT)
     less_heat: float = _fixed(
-        0.2, "", "axes that move warm the bearings of the spindle, whose friction then falls by up to this share", _HEAT
+        0.1, "", "axes that move warm the bearings of the spindle, whose friction then falls by up to this share", _HEAT
     )
     untrained_heat: float = _fixed(
         0.5, "", "share of the heat above that at the trained top speed by which the estimate may be wrong", _HEAT
