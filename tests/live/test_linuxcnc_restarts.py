@@ -26,14 +26,17 @@ SOON = 1800.0 / FACTOR
 #: two values are read at most so much closer together than apart [s]
 JITTER = 0.2
 
-#: what happens to the state while the service does not run; it runs on after nothing only
-CASES: dict[str, Callable[[Path], None]] = {"nothing": lambda _: None, **SPOILED}
+#: what happens to the state while the service does not run, and whether it may run on afterwards: after a state of
+#: another model it takes over the zero, and rebuilds its state from the journal
+CASES: dict[str, tuple[Callable[[Path], None], bool]] = {"nothing": (lambda _: None, True)} | {
+    case: (spoil, case == "of another model") for case, spoil in SPOILED.items()
+}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_restart_is_no_step_and_is_sound_or_held(case: str, tmp_path: Path) -> None:
-    runs, rng, broker = case == "nothing", random.Random(case), Mosquitto(tmp_path)
+    (spoil, runs), rng, broker = CASES[case], random.Random(case), Mosquitto(tmp_path)
     broker.start()
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
@@ -46,7 +49,7 @@ def test_a_restart_is_no_step_and_is_sound_or_held(case: str, tmp_path: Path) ->
         config.write_text(f"{text}\n[page]\nport = {port}\n", encoding="ascii")
         for _ in range(20):
             service.kill()
-            CASES[case](tmp_path / "state.json")
+            spoil(tmp_path / "state.json")
             service.start()
             time.sleep(SOON + rng.uniform(2.0, 7.0))
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/state", timeout=5.0) as answer:

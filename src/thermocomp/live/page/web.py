@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import os
 import socket
 import time
@@ -104,6 +105,7 @@ async def serve(app: FastAPI, listening: socket.socket) -> None:
             await _turn()
             if server.started and not server.should_exit:
                 server.should_exit = True
+                logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # open streams are cancelled
                 await server.shutdown([listening])
             for connection in list(server.server_state.connections):  # connections accepted meanwhile
                 connection.transport.abort()
