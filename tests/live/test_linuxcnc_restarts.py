@@ -26,10 +26,10 @@ SOON = 1800.0 / FACTOR
 #: two values are read at most so much closer together than apart [s]
 JITTER = 0.2
 
-#: what happens to the state while the service does not run, and whether it may run on afterwards: after a state of
-#: another model it takes over the zero, and rebuilds its state from the journal
-CASES: dict[str, tuple[Callable[[Path], None], bool]] = {"nothing": (lambda _: None, True)} | {
-    case: (spoil, case == "of another model") for case, spoil in SPOILED.items()
+#: what happens to the state while the service does not run, and whether it runs on afterwards; after a state of another
+#: model it may: it takes over the zero, and rebuilds its state from the journal if that is complete
+CASES: dict[str, tuple[Callable[[Path], None], bool | None]] = {"nothing": (lambda _: None, True)} | {
+    case: (spoil, None if case == "of another model" else False) for case, spoil in SPOILED.items()
 }
 
 
@@ -54,15 +54,16 @@ def test_a_restart_is_no_step_and_is_sound_or_held(case: str, tmp_path: Path) ->
             time.sleep(SOON + rng.uniform(2.0, 7.0))
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/state", timeout=5.0) as answer:
                 (found,) = json.load(answer)["targets"]
-            assert (found["state"] == "active") == runs, found
-            judged.append((time.monotonic(), error.rows[-1][1] + error.rows[-1][2]))
+            active = found["state"] == "active"
+            assert runs in (None, active), found
+            if active:
+                judged.append((time.monotonic(), error.rows[-1][1] + error.rows[-1][2]))
         rows = error.end()
-        sound = machine.truth, undisturbed(machine, np.array(judged)[:, 0], RATE)
-    at, left = np.array(judged).T
+        at, left = np.array(judged or [(time.monotonic(), 0.0)]).T
+        sound = undisturbed(machine, at, RATE)
     assert np.all(np.abs(np.diff(rows[:, 2])) <= SPREAD * (np.diff(rows[:, 0]) + JITTER))
     assert np.abs(rows[:, 2]).max() > 10.0
-    if runs:
-        deviation = np.interp(at, rows[:, 0], rows[:, 1])
-        expected = deviation + sound[1]
-        print(f"{case}: RMS {np.sqrt(np.mean(left**2)):.2f} um, {np.sqrt(np.mean(expected**2)):.2f} um without kills")
-        assert np.sqrt(np.mean(left**2)) <= 1.5 * np.sqrt(np.mean(expected**2))
+    expected = np.interp(at, rows[:, 0], rows[:, 1]) + sound
+    most = 1.5 * np.sqrt(np.mean(expected**2))
+    print(f"{case}: {len(judged)} active, RMS {np.sqrt(np.mean(left**2)):.2f} um, at most {most:.2f} um")
+    assert np.sqrt(np.mean(left**2)) <= most
