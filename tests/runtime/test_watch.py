@@ -366,22 +366,48 @@ def test_no_temperature_is_predicted_by_itself(watch: Watch) -> None:
             replace(watch, sensors=(replace(first, weights=own), *watch.sensors[1:]))
 
 
+def follow(watch: Watch, samples: Samples, values: FloatArray) -> tuple[NDArray[np.int8], FloatArray]:
+    """Return the faults and the predictions of a run, (n_rows, n_sensors)."""
+    state, faults, predicted = begin(watch, runs=(1,)), list[NDArray[np.int8]](), list[FloatArray]()
+    for k, time in enumerate(samples.time.tolist()):
+        state, _ = look(watch, state, time, values[k], resting=bool(samples.stands[k]))
+        faults.append(state.fault[0])
+        predicted.append(state.predicted[0])
+    return np.array(faults), np.array(predicted)
+
+
 @pytest.mark.parametrize("sensor", range(len(SIX)))
 def test_temperatures_near_heat_for_two_hours_are_unexplained_until_they_have_agreed_for_an_hour(
     watch: Watch, samples: Samples, sensor: int
 ) -> None:
-    """As a bearing of an axis that moves for a while; of two neighbours, the other one may be reported."""
+    """As a bearing of an axis that moves for a while; of two neighbours, the other one may be reported.
+
+    Agreement counts only while the temperature should be far from its zero: at rest any agrees.
+    """
     place = [c.name for c in samples.inputs].index(SIX[sensor])
     values, begin_at, minutes = samples.values[:, None].copy(), 1000, np.arange(len(samples.values) - 1000.0)
     extra = 2.5 * np.where(minutes < 120.0, 1.0 - np.exp(-minutes / 20.0), np.exp(-(minutes - 120.0) / 20.0))
     values[begin_at:, 0, place] += extra
-    state, faults = begin(watch, runs=(1,)), list[NDArray[np.int8]]()
-    for k, time in enumerate(samples.time.tolist()):
-        state, _ = look(watch, state, time, values[k], resting=bool(samples.stands[k]))
-        faults.append(state.fault[0])
-    found = np.array(faults)
+    found, predicted = follow(watch, samples, values)
     times = (samples.time[(found != GOOD).any(axis=1)] - samples.time[begin_at]) / 60.0
     assert set(found.ravel().tolist()) == {GOOD, UNEXPLAINED}
     assert (found != GOOD).any(axis=0).sum() <= 2
     assert 5.0 <= times[0] <= 120.0
-    assert 180.0 <= times[-1] <= 360.0
+    moved = np.abs(predicted) >= 2.0 * watch.limits("off")
+    for row, k in zip(*np.nonzero((found[:-1] == UNEXPLAINED) & (found[1:] == GOOD)), strict=True):
+        assert moved[row - 58 : row + 1, k].all()
+    hot = (moved & (np.arange(len(moved)) > begin_at + 300)[:, None]).sum(axis=0) > 150
+    assert (found[-1, hot] == GOOD).all()
+
+
+@pytest.mark.parametrize("gain", [0.4, 1.8])
+def test_a_sensor_with_a_wrong_gain_is_not_used_again_after_a_rest(watch: Watch, samples: Samples, gain: float) -> None:
+    place = [c.name for c in samples.inputs].index(SIX[0])
+    values = samples.values[:, None].copy()
+    values[:, 0, place] = values[0, 0, place] + gain * (values[:, 0, place] - values[0, 0, place])
+    found, _ = follow(watch, samples, values)
+    own = found[:, watch.names.index(SIX[0])]
+    (mine,) = np.nonzero(own != GOOD)
+    assert mine.size
+    assert (own[mine[0] :] != GOOD).all()
+    assert (np.diff(samples.values[mine[0] :, -1]) != 0).sum() > 4  # with rests

@@ -145,6 +145,20 @@ def test_a_right_speed_that_was_wrong_is_trusted_again_after_eight_hours_with_th
     assert not faults[named[-1] + 1 :].any()
 
 
+def test_a_speed_is_not_trusted_again_while_a_temperature_is_wrong() -> None:
+    """Which nobody has judged meanwhile: the predictions are not sure with an estimated speed."""
+    watch, samples = fitted("linear", few=True), day("linear", 11, few=True)
+    names, time = [c.name for c in samples.inputs], samples.time
+    right, values = samples.values[:, names.index("spindle_rpm")], samples.values.copy()
+    command = np.where((time > 3.5 * 3600.0) & (time < 4.0 * 3600.0), watch.top_speed, right)
+    values[:, names.index("t_housing_C")] += 0.7 * np.maximum(time / 3600.0 - 5.0, 0.0)  # [degC]
+    _, faults = run(watch, replace(samples, values=values), command)
+    rejected = np.flatnonzero(faults[:, -1] == OFF)
+    assert np.array_equal(rejected, np.arange(rejected[0], len(time)))
+    _, faults = run(watch, samples, command)
+    assert faults[-1, -1] == 0
+
+
 @pytest.mark.parametrize("kind", ["zero", "half"])
 def test_a_speed_that_stays_wrong_is_not_trusted_after_a_night_at_rest(kind: str) -> None:
     """For which two hours stand here: at rest it agrees; half the speed is then trusted until the spindle is warm."""

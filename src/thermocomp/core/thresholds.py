@@ -114,6 +114,9 @@ class Thresholds:
         "the same for a swap to be certain: heat near two sensors that was not recorded may resemble one",
         _WATCH,
     )
+    agree_moved: float = _fixed(
+        2.0, "", "agreement counts only where a temperature should have changed by this multiple of its limit", _WATCH
+    )
     speed_return: float = _fixed(
         28_800.0, "s", "a wrong speed that has agreed for so long is trusted again: the models have forgotten it", _HEAT
     )

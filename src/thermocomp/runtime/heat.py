@@ -96,6 +96,7 @@ def check(
     memory: FloatArray,
     times: tuple[float, float],
     failed: BoolArray,
+    over: BoolArray,
     last_change: FloatArray,
 ) -> tuple[HeatState, BoolArray]:
     """Return the next state, and the speeds, (..., n_speeds), that have been wrong for too long.
@@ -112,6 +113,8 @@ def check(
         Time, and time since the last check [s].
     failed : ndarray of bool of shape (..., n_sensors)
         Temperatures with substitutes.
+    over : ndarray of bool of shape (..., 1)
+        Whether the difference of a temperature from its prediction is over its limit.
     last_change : ndarray of shape (..., 1)
         Time at which a temperature last changed: if all repeat, the source has stopped [s].
     """
@@ -127,7 +130,7 @@ def check(
     )
     state = advance(watch, state, read, used, memory[..., :lags], dt)
     state, wrong = find_lasting(watch, state, time, last_change)
-    return trust_again(watch, state, time, lost), wrong
+    return trust_again(watch, state, time, lost, over), wrong
 
 
 def fail(watch: Watch, state: HeatState, memory: FloatArray, wrong: BoolArray) -> tuple[HeatState, FloatArray]:
@@ -191,20 +194,25 @@ def in_doubt(watch: Watch, state: HeatState, time: float) -> BoolArray:
         return np.asarray((time - state.doubt < watch.thresholds.speed_doubt).any(axis=-1))
 
 
-def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray) -> HeatState:
+def trust_again(watch: Watch, state: HeatState, time: float, lost: BoolArray, over: BoolArray) -> HeatState:
     """Trust a speed again that has agreed with the temperatures for long enough.
 
-    A missing one for as long as it was missing; a wrong one until the models have forgotten it, and with the spindle
-    turning, since a speed that always reads 0 agrees all night.
+    A missing one for as long as it was missing; a wrong one until the models have forgotten it, with the spindle
+    turning, since a speed that always reads 0 agrees all night, and no temperature too far from its prediction, since
+    temperatures are not judged before.
     """
     off, of = watch.heat_constants.off, watch.heat_constants.speeds
-    far = np.abs(state.heat - state.estimate) > limits(watch, state)
+    apart = np.abs(state.heat - state.estimate) > limits(watch, state)
     speeds = range(len(watch.speeds))
-    agrees = np.stack([~far[..., of == k].any(axis=-1) for k in speeds], axis=-1)
+    agrees = np.stack([~apart[..., of == k].any(axis=-1) for k in speeds], axis=-1)
     turns = np.stack([(state.heat > off)[..., of == k].all(axis=-1) for k in speeds], axis=-1)
     missing, fits = state.fault == MISSING, (state.fault != GOOD) & ~lost & agrees
     back = _begin(state.back, fits, time)
     with np.errstate(invalid="ignore"):
         absent = np.minimum(back - state.gone, watch.thresholds.return_time)
-        again = fits & (missing | turns) & (time - back >= np.where(missing, absent, watch.thresholds.speed_return))
+        again = (
+            fits
+            & (missing | (turns & ~over))
+            & (time - back >= np.where(missing, absent, watch.thresholds.speed_return))
+        )
     return state._replace(fault=np.where(again, GOOD, state.fault).astype(np.int8), back=np.where(again, np.nan, back))

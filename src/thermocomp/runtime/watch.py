@@ -218,9 +218,11 @@ def _step(
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
     s, stuck = _stuck(watch, s, x, calm)
-    found, wrong = heat.check(watch, s.heat, speeds, used, memory, (time, dt), failed, _last_change(s, calm))
+    over = np.abs(np.where(calm, difference, 0.0) / find_limits(watch, memory)) > 1.0
+    far = np.asarray(over.any(axis=-1, keepdims=True))
+    found, wrong = heat.check(watch, s.heat, speeds, used, memory, (time, dt), failed, far, _last_change(s, calm))
     s = s._replace(heat=found)
-    s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), difference, calm)
+    s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), over, calm)
     s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting, wrong))
     return _returns(watch, s, difference)
 
@@ -289,14 +291,13 @@ def _last_change(s: WatchState, calm: BoolArray) -> FloatArray:
     return np.asarray(np.where(calm, s.still, -np.inf).max(axis=-1, keepdims=True, initial=-np.inf))
 
 
-def _beyond(watch: Watch, s: WatchState, difference: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
-    """Find the runs, (...,), in which a difference has been too large for too long."""
-    z = np.where(calm, difference, 0.0) / find_limits(watch, s.memory)
-    if not (np.abs(z) > 1.0).any():
-        return s._replace(off=np.full(z.shape, np.nan)), np.zeros(z.shape[:-1], dtype=np.bool_)
+def _beyond(watch: Watch, s: WatchState, over: BoolArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
+    """Find the runs, (...,), in which a difference has been over its limit for too long."""
+    if not over.any():
+        return s._replace(off=np.full(over.shape, np.nan)), np.zeros(over.shape[:-1], dtype=np.bool_)
     failed = np.nanmax(np.where(s.fault > MISSING, s.since, -np.inf), axis=-1, initial=-np.inf)
     recent = np.maximum(failed, s.fast)[..., None]
-    beyond = (np.abs(z) > 1.0) & (s.time - recent > watch.thresholds.fault_rest)
+    beyond = over & (s.time - recent > watch.thresholds.fault_rest)
     off = np.where(beyond, np.where(np.isfinite(s.off), s.off, s.time), np.nan)
     with np.errstate(invalid="ignore"):
         lasting = (s.time - off >= watch.thresholds.fault_duration) & (_last_change(s, calm) > off)
@@ -355,7 +356,9 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
     """Trust a missing or unexplained sensor again once it agrees with its prediction."""
     missing = s.fault == MISSING
     with np.errstate(invalid="ignore"):
-        fits = (missing | (s.fault == UNEXPLAINED)) & (np.abs(difference) <= watch.limits("off"))
+        moved = np.abs(s.predicted) >= watch.thresholds.agree_moved * watch.limits("off")  # at rest, all agree
+        may = missing | ((s.fault == UNEXPLAINED) & moved)
+        fits = may & (np.abs(difference) <= watch.limits("off"))
         if not fits.any():
             return s._replace(back=np.full(fits.shape, np.nan))
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)

@@ -141,7 +141,7 @@ def trust_again(s: Kept, w: Work, t: Constants) -> None:
             s.does_agree[k] = fits
             agreed = let("agreed", w.now - s.agrees_since[k])
             soon = let("soon", (agreed >= s.agrees_since[k] - s.gone_since[k]) | (agreed >= t.return_time))
-            forgotten = let("forgotten", w.turns[k] & (agreed >= t.speed_return))
+            forgotten = let("forgotten", w.turns[k] & ~w.some_over & (agreed >= t.speed_return))
             with when(fits & ((missing & soon) | (~missing & forgotten))):
                 s.fault[p] = GOOD
                 s.does_agree[k] = False

@@ -53,6 +53,7 @@ OF_WATCH = (
     "untrained_heat",
     "speed_doubt",
     "less_heat",
+    "agree_moved",
     "speed_return",
     "swap_preferred",
     "swap_certain",

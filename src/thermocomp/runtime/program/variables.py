@@ -184,6 +184,8 @@ class Work(Record):
     wrong = truths("the speed has been wrong for too long", "SPEEDS")
     agrees = truths("the speed agrees with the temperatures", "SPEEDS")
     turns = truths("the spindle turns for certain", "SPEEDS")
+    over = truths("the difference from the prediction is over its limit", "SENSORS")
+    some_over = truth("a temperature is too far from its prediction")
     doubt = truth("a speed has lately become doubtful")
     speeds_rest = number("sum of squares of the residuals if the speeds are wrong")
 
@@ -328,6 +330,7 @@ class Constants(Record):
     untrained_heat = threshold("untrained_heat")
     speed_doubt = threshold("speed_doubt", time=True)
     less_heat = threshold("less_heat")
+    agree_moved = threshold("agree_moved")
     speed_return = threshold("speed_return", time=True)
     swap_preferred = threshold("swap_preferred")
     swap_certain = threshold("swap_certain")

@@ -183,6 +183,7 @@ def look(s: Kept, w: Work, t: Constants) -> None:
             inner = let("inner", choose(w.calm[i], w.difference[i], 0.0))
             s.traces[k * t.SENSORS + i] = follow(s.traces[k * t.SENSORS + i], inner, elapsed / t.tau[k])
     find_stuck(s, w, t)
+    find_over(s, w, t)
     with when(t.supervised):
         heating.check_speeds(s, w, t, elapsed)
     find_fast(s, w, t)
@@ -268,6 +269,20 @@ def find_fast(s: Kept, w: Work, t: Constants) -> None:
 
 
 @procedure
+def find_over(s: Kept, w: Work, t: Constants) -> None:
+    """Find sensors whose difference from the prediction is over its limit."""
+    w.some_over = False
+    for i in each("i", t.SENSORS):
+        caused = let("caused", real(0.0))
+        for k in each("k", t.STATES):
+            caused.set(caused + s.memory[t.LAGGED + k] * t.weight[t.LAGGED + k, i])
+        most = let("most", t.off_limit[i] + t.more_heat * abs(caused))
+        w.over[i] = w.calm[i] & (abs(w.difference[i] / most) > 1.0)
+        with when(w.over[i]):
+            w.some_over = True
+
+
+@procedure
 def find_off(s: Kept, w: Work, t: Constants) -> None:
     """Find sensors whose difference from the prediction has been too large for too long."""
     rested = let("rested", ~s.was_fast | (w.now - s.fast > t.fault_rest))
@@ -276,11 +291,7 @@ def find_off(s: Kept, w: Work, t: Constants) -> None:
             rested.set(False)
     w.lasting = False
     for i in each("i", t.SENSORS):
-        caused = let("caused", real(0.0))
-        for k in each("k", t.STATES):
-            caused.set(caused + s.memory[t.LAGGED + k] * t.weight[t.LAGGED + k, i])
-        most = let("most", t.off_limit[i] + t.more_heat * abs(caused))
-        beyond = let("beyond", rested & w.calm[i] & (abs(w.difference[i] / most) > 1.0))
+        beyond = let("beyond", rested & w.over[i])
         with when(beyond & ~s.is_off[i]):
             s.off_since[i] = w.now
         s.is_off[i] = beyond
@@ -293,7 +304,8 @@ def believe_again(s: Kept, w: Work, t: Constants) -> None:
     """Trust a missing or unexplained sensor again once its readings agree with the prediction."""
     for i in each("i", t.SENSORS):
         missing = let("missing", s.fault[i].equals(MISSING))
-        may = let("may", missing | s.fault[i].equals(UNEXPLAINED))
+        moved = let("moved", abs(s.predicted[i]) >= t.agree_moved * t.off_limit[i])
+        may = let("may", missing | (s.fault[i].equals(UNEXPLAINED) & moved))
         fits = let("fits", may & w.there[i] & (abs(w.difference[i]) <= t.off_limit[i]))
         with when(fits & ~s.is_back[i]):
             s.back[i] = w.now
