@@ -257,7 +257,7 @@ def sound(
     share, hours = float(np.mean(active)), sum(float(t.time[-1]) for t in tests) / 3600.0
     told = ", ".join(f"{w} (in {n} of {len(tests)} tests)" for w, n in alarms.items()) or "none"
     print(f"  {title}, {per} readings per update, {hours:.0f} h: false alarms {told}; active {share:.2%}", flush=True)
-    return not any(w for w in alarms if not (moving and w.endswith(UNSURE))) and share >= ACTIVE
+    return all(moving and w.endswith(UNSURE) for w in alarms) and share >= ACTIVE
 
 
 def freeze(model: ErrorModel, test: Recording, count: int) -> bool:

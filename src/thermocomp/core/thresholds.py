@@ -118,7 +118,10 @@ class Thresholds:
         2.0, "", "agreement counts only where a temperature should have changed by this multiple of its limit", _WATCH
     )
     speed_return: float = _fixed(
-        28_800.0, "s", "a wrong speed that has agreed for so long is trusted again: the models have forgotten it", _HEAT
+        28_800.0,
+        "s",
+        "a wrong speed that has agreed for this time is trusted again: the models have forgotten it",
+        _HEAT,
     )
 
     # repetition of all temperatures
