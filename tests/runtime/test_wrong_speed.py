@@ -151,7 +151,7 @@ def test_a_speed_is_not_trusted_again_while_a_temperature_is_wrong() -> None:
     names, time = [c.name for c in samples.inputs], samples.time
     right, values = samples.values[:, names.index("spindle_rpm")], samples.values.copy()
     command = np.where((time > 3.5 * 3600.0) & (time < 4.0 * 3600.0), watch.top_speed, right)
-    values[:, names.index("t_housing_C")] += 0.7 * np.maximum(time / 3600.0 - 5.0, 0.0)  # [degC]
+    values[:, names.index("t_column_front_right_C")] += 0.7 * np.maximum(time / 3600.0 - 5.0, 0.0)  # [degC]
     _, faults = run(watch, replace(samples, values=values), command)
     rejected = np.flatnonzero(faults[:, -1] == OFF)
     assert np.array_equal(rejected, np.arange(rejected[0], len(time)))
