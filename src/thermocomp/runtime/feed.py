@@ -84,9 +84,9 @@ class TemperatureFeed:
         changed = sum(map(float.__ne__, given, feed.values))
         if changed:
             both = zip(given, feed.values, feed.steps, strict=True)
-            steps = tuple([min(s, abs(v - b)) if v != b else s for v, b, s in both])
-            feed = self._learn(feed, changed)
-            feed = feed._replace(values=given, steps=steps, repeated=0.0, predicted=(), moved="")
+            # twice as fast as `min`
+            steps = tuple([s if v == b or (step := abs(v - b)) > s else step for v, b, s in both])
+            feed = self._learn(feed, changed)._replace(values=given, steps=steps, repeated=0.0, predicted=(), moved="")
         elif any(v != NONE for v in given):
             feed = feed._replace(repeated=min(feed.repeated + 1.0, MOST_REPEATED))
         return feed, self._explain(feed)

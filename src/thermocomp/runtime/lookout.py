@@ -42,7 +42,7 @@ class Lookout:
         return {
             name: WORDS[fault]
             for lookout, state in zip(lookouts, states, strict=True)
-            if np.count_nonzero(faults := state.faults(lookout.watch))
-            for name, fault in zip(lookout.watch.failing, faults.tolist(), strict=True)
+            if not state.sound
+            for name, fault in zip(lookout.watch.failing, state.faults(lookout.watch).tolist(), strict=True)
             if fault
         }

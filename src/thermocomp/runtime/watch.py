@@ -57,6 +57,11 @@ class WatchState(NamedTuple):
     fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
     heat: HeatState = HeatState()  #: supervision of the speeds
 
+    @property
+    def sound(self) -> bool:
+        """True if no input has failed, without the cost of `faults`."""
+        return not (np.count_nonzero(self.fault) or np.count_nonzero(self.heat.fault))
+
     def faults(self, watch: Watch) -> IntArray:
         """Return the faults of the inputs that can fail, (..., n_failing): temperatures, then supervised speeds."""
         return (
@@ -108,8 +113,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
 def is_quiet(watch: Watch, state: WatchState, time: float) -> bool:
     """Return whether all sensors are good and no check is due; a plausible reading is then used unchanged."""
     due = not time - state.time < watch.thresholds.check_interval  # also if the time is unknown
-    failed = np.count_nonzero(state.fault) or np.count_nonzero(state.heat.fault)
-    return not (due or failed or np.count_nonzero(state.jumped == state.jumped))
+    return not due and state.sound and not np.count_nonzero(state.jumped == state.jumped)
 
 
 def look(
