@@ -1,13 +1,13 @@
 """The do-no-harm gate: a model is accepted, unproven or refused, by its errors on independent cycles or files.
 
 The thermal cycles or files are unseen by the model; they are independent, unlike the rows of a drift. A model is better
-if the logarithm of the ratio of its error to that of every baseline is below zero by a one-sided t-test over these
-cycles or files; it is harmful if it is much worse than no compensation in a single one. For the reasons see
-``docs/decisions/0020-verdict.md``.
+than a baseline if its error is smaller on average over these cycles or files, and if its output agrees with the
+baseline's error by a one-sided t-test over them (`thermocomp.judging.baselines`). It is harmful if it is much worse
+than no compensation in a single one. For the reasons see ``docs/decisions/0020-verdict.md`` and ``0048-proof.md``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -17,21 +17,28 @@ from scipy import stats
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.learned import Learned
 from thermocomp.core.size import Size
+from thermocomp.judging.baselines import (
+    BASELINES,
+    CURVE,
+    OF_TIME,
+    REZEROED,
+    SLOW,
+    Against,
+    Series,
+    compare_with_time,
+    rezero,
+    worst_of,
+)
 from thermocomp.judging.splits import MIN_ROWS
 
 Word = Literal["accepted", "unproven", "refused"]
 
 #: minimum number of cycles or files for a significance test
 MIN_UNITS = 3
-#: lower bound of the noise of a probe [um]
-NO_NOISE = 1e-3
+#: smaller p-values are not told apart: the test assumes normal values
+LEAST_P = 0.001
 #: significance level of the one-sided test
 LEVEL = 0.05
-#: baselines for comparison
-BASELINES = ("no compensation", "the learned mean", "the last learned value")
-#: fourth baseline for a single continuous block: without model, both relative to the mean of the block's first rows
-NAMES = (*BASELINES, "no compensation, both re-zeroed at the start of the block")
-REZERO_ROWS = 5
 #: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
 #: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
@@ -50,8 +57,8 @@ class JudgedUnit:
     ----------
     rms, largest : float
         RMS and largest absolute value of the residual [um].
-    baselines : tuple of float
-        Residual RMS of each of `BASELINES` [um].
+    baselines : tuple of Against
+        Comparison with each of `BASELINES`; in a section that continues the training data also with `REZEROED`.
     none_largest : float
         Largest deviation without compensation [um].
     noise : float
@@ -60,25 +67,25 @@ class JudgedUnit:
         Tolerated degradation [um].
     moves : bool
         Whether the deviation changes enough to distinguish a model from a constant.
-    rezeroed : tuple of (float, float) or None
-        RMS with and without the model, both relative to the start of the cycle or file [um].
+    series : Series or None
+        Rows for the comparison with the baselines that know the time; None: without these.
     """
 
     name: str
     rows: int
     rms: float
     largest: float
-    baselines: tuple[float, ...]
+    baselines: tuple[Against, ...]
     none_largest: float
     noise: float
     margin: float
     moves: bool
-    rezeroed: tuple[float, float] | None = None
+    series: Series | None = field(default=None, compare=False)
 
     @property
     def none_rms(self) -> float:
         """RMS without compensation in this cycle or file [um]."""
-        return self.baselines[0]
+        return self.baselines[0].other
 
     @property
     def harm(self) -> float:
@@ -89,13 +96,6 @@ class JudgedUnit:
     def harmful(self) -> bool:
         """True if the harm exceeds the margin."""
         return self.harm > self.margin
-
-    @property
-    def log_ratios(self) -> tuple[float, ...]:
-        """Logarithm of the ratio of the error to that of each baseline; errors are at least the noise."""
-        least = max(self.noise, NO_NOISE)
-        pairs = [(self.rms, b) for b in self.baselines] + ([self.rezeroed] if self.rezeroed else [])
-        return tuple(float(np.log(max(model, least) / max(other, least))) for model, other in pairs)
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ class Verdict:
         P-value of the test, corrected for the number of methods; None: computed from the errors.
     about : str
         Reason why the p-value is not corrected for the number of methods; empty if it is.
-    names : tuple of str
-        Names of the baselines.
+    given : tuple of str
+        Names of the baselines of the units.
     stated : float or None
         Tolerated degradation as set by the user before the evaluation; None: calculated by `margin_of`.
     """
@@ -129,25 +129,45 @@ class Verdict:
     tried: int = 1
     p: float | None = None
     about: str = ""
-    names: tuple[str, ...] = NAMES
+    given: tuple[str, ...] = (*BASELINES, REZEROED)
     stated: float | None = None
 
     @cached_property
-    def p_values(self) -> tuple[float, ...]:
-        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` cycles or files."""
+    def compared(self) -> dict[str, tuple[Against, ...]]:
+        """Comparison with each baseline in each cycle or file."""
+        if not self.units:
+            return {}
+        columns = zip(*(u.baselines for u in self.units), strict=True)
+        found = dict(zip(self.given, columns, strict=False))
+        series = [u.series for u in self.units if u.series is not None]
+        if len(series) == len(self.units) >= MIN_UNITS and REZEROED not in found:
+            of_time = compare_with_time(series, [u.noise for u in self.units])
+            found |= dict(zip(OF_TIME, zip(*of_time, strict=True), strict=True))
+        return found
+
+    @cached_property
+    def mean_ratios(self) -> dict[str, float]:
+        """Mean logarithm of the ratio of the errors of model and baseline."""
+        return {
+            name: float(np.mean([a.log_ratio(u.noise) for a, u in zip(column, self.units, strict=True)]))
+            for name, column in self.compared.items()
+        }
+
+    @cached_property
+    def p_values(self) -> dict[str, float]:
+        """One-sided p-value for each baseline; 1 with fewer than `MIN_UNITS` units, or if not beaten on average."""
         if len(self.units) < MIN_UNITS:
-            return (1.0,) * len(self.names)
-        ratios = np.array([u.log_ratios for u in self.units])
-        mean, error = ratios.mean(axis=0), stats.sem(ratios, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.where(error > 0, mean / error, np.sign(mean) * np.inf)
-        found = np.where(mean == 0, 1.0, stats.t.cdf(t, len(self.units) - 1))
-        return tuple(found.tolist())
+            return dict.fromkeys(self.compared, 1.0)
+        return {
+            name: _p_above_zero([a.agreement for a in column]) if self.mean_ratios[name] < 0 else 1.0
+            for name, column in self.compared.items()
+        }
 
     @property
-    def worst(self) -> int:
-        """Index of the baseline that is hardest to beat."""
-        return int(np.argmax(self.p_values)) if len(self.units) >= MIN_UNITS else int(np.argmax(self._mean_ratios))
+    def worst(self) -> str:
+        """Name of the baseline that is hardest to beat."""
+        names = list(self.compared)
+        return max(names, key=lambda name: (self.p_values[name], self.mean_ratios[name]))
 
     @property
     def p_value(self) -> float:
@@ -155,9 +175,11 @@ class Verdict:
         return self.p_values[self.worst] if self.p is None else self.p
 
     @property
-    def _mean_ratios(self) -> FloatArray:
-        found: FloatArray = np.array([u.log_ratios for u in self.units]).mean(axis=0)
-        return found
+    def _unbeaten(self) -> str:
+        """Baseline that refuses the model because it is at least as good; empty if there is none."""
+        found = {name: ratio for name, ratio in self.mean_ratios.items() if name not in OF_TIME}
+        name = max(found, key=found.__getitem__)
+        return name if found[name] >= 0 else ""
 
     @cached_property
     def word(self) -> Word:
@@ -166,7 +188,7 @@ class Verdict:
             return "refused"
         if not self.units or not self._moving:
             return "unproven"
-        if (self._mean_ratios >= 0).any():
+        if self._unbeaten:
             return "refused"
         enough = len(self.units) >= MIN_UNITS and self._moving >= MIN_UNITS - 1
         return "accepted" if enough and not self.caps and self.p_value <= LEVEL else "unproven"
@@ -192,14 +214,13 @@ class Verdict:
         if any(u.harmful for u in self.units):
             worst = max(self.units, key=lambda u: u.harm - u.margin)
             return f"does harm in {worst.name}: {self._figures(worst)} (margin {worst.margin:.2g} {self.unit})"
-        if self._moving and (self._mean_ratios >= 0).any():
-            k = int(np.argmax(self._mean_ratios))
-            return f"no better than {self.names[k]}: {self._pooled(k)}"
+        if self._moving and self._unbeaten:
+            return f"no better than {self._unbeaten}: {self._pooled(self._unbeaten)}"
         return self._why_accepted() if self.accepted else self._why_unproven()
 
     def _why_accepted(self) -> str:
         least = max(self.units, key=lambda u: u.harm)
-        others = f"better than {self.names[self.worst]} and the other baselines"
+        others = f"better than {self.worst} and the other baselines"
         return f"{others}, {self._tested()}; smallest gain in {least.name}: {self._figures(least)}"
 
     def _why_unproven(self) -> str:
@@ -214,14 +235,15 @@ class Verdict:
             return f"judged on only {n} of {MIN_UNITS} required cycles or files"
         if moving < MIN_UNITS - 1:
             return f"only {moving} of {n} cycles or files have a significant drift"
-        return f"not shown to be better than {self.names[self.worst]}: {self._pooled(self.worst)}, {self._tested()}"
+        name = self.worst
+        if self.mean_ratios[name] >= 0:
+            return f"not shown to be better than {name}: {self._pooled(name)}"
+        return f"not shown to be better than {name}: {self._pooled(name)}, {self._tested()}"
 
     def _tested(self) -> str:
         tried = f", {self.tried} methods tried" if self.tried > 1 else ""
-        return (
-            f"p = {self.p_value:.2g} over {len(self.units)} cycles or "
-            f"files{tried}{', ' if self.about else ''}{self.about}"
-        )
+        p = f"p = {self.p_value:.2g}" if self.p_value >= LEAST_P else f"p < {LEAST_P}"
+        return f"{p} over {len(self.units)} cycles or files{tried}{', ' if self.about else ''}{self.about}"
 
     @property
     def told(self) -> str:
@@ -244,14 +266,25 @@ class Verdict:
             return f"record {_count(MIN_UNITS - n, 'more thermal cycle')}, at other speeds or on other days"
         if self._moving < MIN_UNITS - 1:
             return "record cycles with a warm-up or a change of speed"
+        return self._more_units()
+
+    def _more_units(self) -> str:
+        """Advice if all required cycles or files were judged."""
+        if self.worst == CURVE:
+            return "the drift is much the same each time: record other speeds and durations"
+        if self.worst == SLOW and len({u.series.record for u in self.units if u.series}) < MIN_UNITS:
+            return (
+                "the cycles of a recording share its warm-up and its days: let the machine cool and record again, "
+                f"{MIN_UNITS} starts in all, or run speeds in a random order"
+            )
         more = self._units_for(LEVEL if self.p is None else LEVEL / max(self.tried, 1))
         return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
 
     def _units_for(self, level: float) -> int | None:
         """Return the number of cycles or files with such errors that would suffice for acceptance; None if over 50."""
-        ratios = np.array([u.log_ratios[self.worst] for u in self.units])
-        effect = -ratios.mean() / max(ratios.std(ddof=1), 1e-9)
-        for n in range(len(ratios) + 1, 51):
+        agreements = np.array([a.agreement for a in self.compared[self.worst]])
+        effect = agreements.mean() / max(agreements.std(ddof=1), 1e-9)
+        for n in range(len(agreements) + 1, 51):
             if stats.t.sf(effect * np.sqrt(n), n - 1) <= level / 2:  # half the level: clearly below
                 return n
         return None
@@ -262,10 +295,15 @@ class Verdict:
             text += f", largest {u.largest:.2f} and {u.none_largest:.2f} {self.unit}"
         return text
 
-    def _pooled(self, k: int) -> str:
-        pairs = [(u.rms, u.baselines[k]) if k < len(u.baselines) else u.rezeroed or (0, 0) for u in self.units]
-        mine, other = np.sqrt(np.mean(np.square(pairs), axis=0))
+    def _pooled(self, name: str) -> str:
+        mine, other = np.sqrt(np.mean(np.square([(a.rms, a.other) for a in self.compared[name]]), axis=0))
         return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
+
+
+def _p_above_zero(agreements: Sequence[float]) -> float:
+    """Return the p-value of a one-sided t-test of the mean."""
+    mean, error = float(np.mean(agreements)), float(stats.sem(agreements))
+    return float(stats.t.sf(mean / error, len(agreements) - 1)) if error > 0 else float(mean <= 0)
 
 
 def measure(
@@ -274,9 +312,11 @@ def measure(
     predicted: FloatArray,
     learned: Learned,
     *,
+    alone: FloatArray | None = None,
     unit: str = "um",
     margin: float | None = None,
     stretch: bool = False,
+    series: tuple[str, FloatArray] | None = None,
 ) -> JudgedUnit:
     """Return the results of a model in one unseen cycle or file.
 
@@ -284,25 +324,33 @@ def measure(
     ----------
     measured, predicted : ndarray of shape (n_rows,)
         Deviations of one unseen cycle or file [um].
+    alone : ndarray of shape (n_rows,), optional
+        Prediction of the model alone, if `predicted` is the output of a compensator: the worse one counts, so no model
+        is accepted because of limits [um].
     margin : float, optional
         Tolerated degradation [um], set before the evaluation; see `margin_of`.
+    series : tuple of str and ndarray of shape (n_rows,), optional
+        Fingerprint of the recording, and time since its start [s]: see `Series`.
     """
-    residual = measured - predicted
-    size = Size.of(residual)
-    allowed = margin_of(learned, unit) if margin is None else margin
-    baselines = (0.0, learned.mean, learned.last)
+    errors = [measured - predicted]
+    if alone is not None and not np.array_equal(alone, predicted):
+        errors.append(measured - alone)
+    sizes = [Size.of(e) for e in errors]
+    others = [worst_of(errors, measured - b, learned.noise) for b in (0.0, learned.mean, learned.last)]
+    if stretch:
+        others.append(worst_of([rezero(e) for e in errors], rezero(measured), learned.noise))
     span = float(np.ptp(measured)) - 4 * learned.noise  # minus the span of the noise alone
     return JudgedUnit(
         name=name,
         rows=len(measured),
-        rms=size.rms,
-        largest=size.largest,
-        baselines=tuple(Size.of(measured - b).rms for b in baselines),
+        rms=max(s.rms for s in sizes),
+        largest=max(s.largest for s in sizes),
+        baselines=tuple(others),
         none_largest=float(np.abs(measured).max()),
         noise=learned.noise,
-        margin=allowed,
+        margin=margin_of(learned, unit) if margin is None else margin,
         moves=span > max(TIMES_NOISE * learned.noise, MOVES * learned.largest),
-        rezeroed=(_rezeroed_rms(residual), _rezeroed_rms(measured)) if stretch else None,
+        series=None if series is None else Series(*series, measured, tuple(errors)),
     )
 
 
@@ -331,11 +379,6 @@ def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
     corrected = np.empty(n)
     corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (n - np.arange(n))), 1.0)
     return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]
-
-
-def _rezeroed_rms(x: FloatArray) -> float:
-    """Return the RMS relative to the mean of the first rows."""
-    return Size.of(x - x[:REZERO_ROWS].mean()).rms
 
 
 def _count(n: int, what: str) -> str:

@@ -1,11 +1,11 @@
 """Judge one model on one unseen block: residual, and whether the model may run."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel
@@ -114,20 +114,19 @@ def _verdict(
     """Return the verdict on `rows`, in each judged part on the worse of the compensator and the model alone."""
     target = [c.name for c in samples.targets].index(model.target)
     segments = [(split.name, rows[rows])] if split.whole else list(_segments(samples, rows))
-    against = learned or samples.learned(target, rows)
+    against, (run, alone) = learned or samples.learned(target, rows), both
     return do_no_harm.Verdict(
         units=tuple(
-            _worse(
-                do_no_harm.measure(
-                    unit,
-                    measured[mine],
-                    run_or_alone[mine],
-                    against,
-                    unit=model.unit,
-                    margin=rules.margin,
-                    stretch=split.stretch,
-                )
-                for run_or_alone in both
+            do_no_harm.measure(
+                unit,
+                measured[mine],
+                run[mine],
+                against,
+                alone=alone[mine],
+                unit=model.unit,
+                margin=rules.margin,
+                stretch=split.stretch,
+                series=_place(samples, np.flatnonzero(rows)[mine]),
             )
             for unit, mine in segments
             if mine.sum() >= MIN_ROWS
@@ -139,11 +138,17 @@ def _verdict(
     )
 
 
-def _worse(both: Iterable[do_no_harm.JudgedUnit]) -> do_no_harm.JudgedUnit:
-    """Return the worse result in a cycle or file, of compensator or model: no model is accepted because of limits."""
-    ran, alone = both
-    rezeroed = max((u.rezeroed for u in (ran, alone) if u.rezeroed), default=None)
-    return replace(ran, rms=max(ran.rms, alone.rms), largest=max(ran.largest, alone.largest), rezeroed=rezeroed)
+def _place(samples: Samples, rows: IntArray) -> tuple[str, FloatArray]:
+    """Return the recording of a cycle, day or file (see `Samples.begin`), and the time of its rows since its start [s].
+
+    The files of a day follow each other by their time stamps.
+    """
+    tests = np.unique(samples.test[rows])
+    record, begin = samples.begin(int(tests[0]))
+    if len(tests) == 1:
+        return record, begin + samples.time[rows]
+    clock = samples.clock()[rows]
+    return record, begin + samples.time[rows[0]] + (clock - clock[0]).astype(np.float64)
 
 
 def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:

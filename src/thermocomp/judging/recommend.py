@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermocomp.judging import do_no_harm
+from thermocomp.judging.baselines import NO_NOISE
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
@@ -119,7 +120,7 @@ def recommend(
     for k, name in enumerate(methods):
         for found, values in zip(inners, inner[name], strict=True):
             for (u, v), rms in zip(found.scores, values, strict=True):
-                logs[k, u, v] = np.log(max(rms, do_no_harm.NO_NOISE))
+                logs[k, u, v] = np.log(max(rms, NO_NOISE))
     best = np.nanmean(logs, axis=2).argmin(axis=0)
     chosen = tuple(methods[k] for k in best)
     judged = [parts[name][u] for u, name in enumerate(chosen)]
@@ -133,7 +134,7 @@ def _log(verdict: do_no_harm.Verdict) -> float:
     """Return the logarithm of a method's error on a block; infinite if it failed, nan if there were too few rows."""
     if not verdict.units:
         return np.inf if verdict.refusal else np.nan
-    return float(np.mean([np.log(max(u.rms, do_no_harm.NO_NOISE)) for u in verdict.units]))
+    return float(np.mean([np.log(max(u.rms, NO_NOISE)) for u in verdict.units]))
 
 
 def correct_verdicts(

@@ -146,13 +146,29 @@ class Samples:
 
     def days(self) -> "NDArray[np.datetime64]":
         """Return the day of each row, (n_rows,); NaT where the recording has no time stamps."""
-        found = np.full(len(self), "NaT", "datetime64[D]")
+        return self.clock().astype("datetime64[D]")
+
+    def clock(self) -> "NDArray[np.datetime64]":
+        """Return date and time of each row, (n_rows,); NaT where the recording has no time stamps."""
+        found = np.full(len(self), "NaT", "datetime64[s]")
         for k, stamp in enumerate(self.stamps):
             mine = self.test == k
             if stamp:
                 begin = np.datetime64(datetime.fromisoformat(stamp).replace(tzinfo=None), "s")
-                found[mine] = (begin + self.time[mine].astype("timedelta64[s]")).astype("datetime64[D]")
+                found[mine] = begin + self.time[mine].astype("timedelta64[s]")
         return found
+
+    def begin(self, test: int) -> tuple[str, float]:
+        """Return the fingerprint of the first of the files that a test continues, and the test's time 0 in it [s]."""
+        start = self.starts[test] if self.starts else None
+        if start is None or start.word != "continued":
+            return self.hashes[test], 0.0
+        earlier = start.earlier[0].fingerprint
+        if earlier not in self.hashes:
+            return earlier, 0.0
+        before = self.hashes.index(earlier)
+        first, begin = self.begin(before)
+        return first, begin + float(self.time[(self.test == before) & (self.cycle >= 0)][0])
 
     def dt(self) -> FloatArray:
         """Return the time since the previous row of the same test [s]; inf in the first row of each test."""

@@ -110,11 +110,12 @@ def assessment(a: Assessment) -> dict[str, Any]:
                 "name": u.name,
                 "rms_um": u.rms,
                 "none_rms_um": u.none_rms,
-                "baselines_rms_um": dict(zip(a.verdict.names, u.baselines, strict=False)),
+                "baselines_rms_um": {name: column[k].other for name, column in a.verdict.compared.items()},
+                "agreement": {name: column[k].agreement for name, column in a.verdict.compared.items()},
                 "margin_um": u.margin,
                 "harmful": u.harmful,
             }
-            for u in a.verdict.units
+            for k, u in enumerate(a.verdict.units)
         ],
         "sensors": list(a.sensors),
         "n_sensors": a.n_sensors[1],

@@ -13,6 +13,7 @@ from thermocomp.core.learned import Learned
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.size import Size
 from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging.baselines import compare_errors
 from thermocomp.judging.replay import replay
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.recordings.profiles import Profiles
@@ -150,7 +151,6 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
     filled = np.array([e[0].size > 0 for e in triples], dtype=np.bool_)
     if not filled.any():
         raise FitError(f"{tests[0].target}: no profile is left for validation")
-    rms = np.array([[Size.of(e).rms for e in triple] for triple in triples])
     segments: list[tuple[str, BoolArray]] = []
     for split, part in zip(one.judging.splits, parts, strict=True):
         mine = filled & np.isin(rows, part.state)
@@ -161,12 +161,14 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
             segments += [(samples.cycle_names[k], mine & (cycle == k)) for k in np.unique(cycle[mine])]
     verdict = do_no_harm.Verdict(
         units=tuple(
-            _unit(name, rms[mine], unit, thermal=bool(options.powers))
+            _unit(
+                name, [t for t, wanted in zip(triples, mine, strict=True) if wanted], unit, thermal=bool(options.powers)
+            )
             for name, mine in segments
             if mine.sum() >= MIN_STATES
         ),
         unit=unit,
-        names=BESIDE,
+        given=BESIDE,
         caps=("judged on one section that continues the training data",) if one.judging.splits[0].stretch else (),
     )
     measured, predicted = _factors(one, parts, options) if options.powers else (np.empty((len(rows), 0)),) * 2
@@ -201,16 +203,21 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
     )
 
 
-def _unit(name: str, rms: FloatArray, unit: str, *, thermal: bool) -> do_no_harm.JudgedUnit:
-    """Return a cycle with the RMS of its profiles, (n, 3): without compensation, with the cold profile alone, model."""
-    none, geometric, left = np.sqrt(np.mean(rms**2, axis=0)).tolist()
+def _unit(
+    name: str, errors: Sequence[tuple[FloatArray, FloatArray, FloatArray]], unit: str, *, thermal: bool
+) -> do_no_harm.JudgedUnit:
+    """Return a cycle with the errors of its profiles: without compensation, with the cold profile alone, model."""
+    rms = np.array([[Size.of(e).rms for e in triple] for triple in errors])
+    points = np.array([len(triple[0]) for triple in errors])
+    weights = np.repeat(np.sqrt(np.mean(points) / points), points)  # every profile counts the same
+    none, geometric, left = (weights * np.concatenate(e) for e in zip(*errors, strict=True))
     largest = float(rms[:, 0].max())
     return do_no_harm.JudgedUnit(
         name=name,
         rows=len(rms),
-        rms=left,
+        rms=Size.of(left).rms,
         largest=float(rms[:, 2].max()),
-        baselines=(none, geometric) if thermal else (none,),
+        baselines=tuple(compare_errors(left, other, 0.0) for other in ((none, geometric) if thermal else (none,))),
         none_largest=largest,
         noise=0.0,
         margin=do_no_harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),

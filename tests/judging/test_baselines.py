@@ -1,0 +1,89 @@
+"""Baselines: agreement with an error, and the two that know the time only."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from thermocomp.core.learned import Learned
+from thermocomp.judging.baselines import CURVE, SLOW, compare_errors
+from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, measure
+
+FloatArray = NDArray[np.float64]
+
+NOTHING = Learned(mean=0.0, last=0.0, noise=0.05, largest=20.0)
+MINUTE = 60.0
+
+
+def cycles(measured: FloatArray, predicted: FloatArray, n: int, records: int = 1) -> Verdict:
+    """Return the verdict over a series cut into cycles, of one recording or of several one after the other."""
+    units: list[JudgedUnit] = []
+    rows = len(measured) // n
+    for k in range(n):
+        mine = slice(k * rows, (k + 1) * rows)
+        record = k * records // n
+        time = MINUTE * (np.arange(k * rows, (k + 1) * rows) - record * len(measured) // records)
+        of = (f"recording {record}", time)
+        units.append(measure(str(k), measured[mine], predicted[mine], NOTHING, series=of))
+    return Verdict(tuple(units))
+
+
+def warm_up(rows: int, tau: float) -> FloatArray:
+    return 20.0 * (1 - np.exp(-np.arange(rows) / tau))
+
+
+def test_agreement_is_one_zero_or_minus_one() -> None:
+    error = np.sin(np.linspace(0, 2 * np.pi, 1000, endpoint=False))
+    other = np.cos(np.linspace(0, 2 * np.pi, 1000, endpoint=False))
+    for output, wanted in ((error, 1.0), (other, 0.0), (-error, -1.0), (0.5 * error, 0.8), (0.0 * error, 0.0)):
+        assert compare_errors(error - output, error, 0.01).agreement == pytest.approx(wanted, abs=1e-12)
+    assert compare_errors(0.0 * error, error, 0.5).agreement == 0.0  # of the size of the noise
+
+
+def test_one_warm_up_is_no_proof_however_many_cycles() -> None:
+    """Drift and output warm up with different time constants: in no other way have they to do with each other."""
+    rng = np.random.default_rng(0)
+    drift = warm_up(480, 150.0) + 0.05 * rng.normal(size=480)
+    for n in (4, 6, 8, 12):
+        found = cycles(drift, warm_up(480, 100.0), n)
+        assert found.word == "unproven"
+        assert found.worst == SLOW
+        assert "let the machine cool and record again" in found.advice
+
+
+def test_what_is_faster_than_a_cycle_is_a_proof() -> None:
+    rng = np.random.default_rng(0)
+    heat = np.tile(np.repeat([1.0, 0.0], [40, 20]), 8)
+    fast = np.convolve(heat, np.exp(-np.arange(60) / 15.0), "full")[:480]
+    drift = warm_up(480, 150.0) + fast + 0.05 * rng.normal(size=480)
+    same = cycles(drift, 0.9 * drift, 8)
+    assert same.p_values[SLOW] < 0.001
+    # each cycle the same: its curve over time explains as much
+    assert cycles(drift, warm_up(480, 150.0), 8).word == "unproven"
+
+
+def test_separate_warm_ups_prove_a_model_that_knows_their_size() -> None:
+    sizes = np.repeat([0.3, 1.0, 0.6, 1.4, 0.8], 100)
+    drift = np.tile(warm_up(100, 30.0), 5) * sizes + 0.05 * np.random.default_rng(0).normal(size=500)
+    found = cycles(drift, 0.8 * np.tile(warm_up(100, 30.0), 5) * sizes, 5, records=5)
+    assert found.accepted
+
+
+def test_a_drift_that_is_the_same_each_time_is_known_from_its_curve() -> None:
+    drift = np.tile(warm_up(100, 30.0), 5) + 0.05 * np.random.default_rng(0).normal(size=500)
+    found = cycles(drift, 0.9 * np.tile(warm_up(100, 30.0), 5), 5, records=5)
+    assert (found.word, found.worst) == ("unproven", CURVE)
+    assert found.reason.startswith(f"not shown to be better than {CURVE}: RMS ")
+    assert "record other speeds and durations" in found.advice
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 10), st.floats(-50, 50), st.floats(-50, 50))
+def test_slow_changes_of_a_recording_make_no_difference(seed: int, n: int, first: float, second: float) -> None:
+    """A trend and waves that drift and output share, of whatever size."""
+    rng = np.random.default_rng(seed)
+    drift, output = 10.0 * rng.normal(size=(2, 40 * n))
+    u = np.linspace(0, 1, 40 * n)
+    slow = first * u + second * np.cos(np.pi * rng.integers(1, n + 1) * u)
+    one, other = (cycles(drift + c * slow, output + c * slow, n).compared[SLOW] for c in (0.0, 1.0))
+    np.testing.assert_allclose(np.array(one), np.array(other), atol=1e-6)
