@@ -70,6 +70,18 @@ def test_separate_warm_ups_prove_a_model_that_knows_their_size() -> None:
     assert found.accepted
 
 
+def test_a_model_that_knows_more_than_the_curve_is_accepted_for_this_duty() -> None:
+    """The same warm-up each time; of the weather, the model knows four fifths."""
+    rng = np.random.default_rng(0)
+    weather = [2.0 * np.sin(np.linspace(a, a + 3, 100)) for a in rng.uniform(0, 6, 6)]
+    weather = [w - w[0] for w in weather]
+    drift = np.concatenate([warm_up(100, 30.0) + w for w in weather]) + 0.05 * rng.normal(size=600)
+    found = cycles(drift, np.concatenate([warm_up(100, 30.0) + 0.8 * w for w in weather]), 6, records=6)
+    assert found.word == "accepted for this duty"
+    assert found.accepted
+    assert found.reason.endswith("the drift is much the same each time, so other speeds and durations are not proved")
+
+
 def test_a_drift_that_is_the_same_each_time_is_known_from_its_curve() -> None:
     drift = np.tile(warm_up(100, 30.0), 5) + 0.05 * np.random.default_rng(0).normal(size=500)
     found = cycles(drift, 0.9 * np.tile(warm_up(100, 30.0), 5), 5, records=5)

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
-from thermocomp.core.provenance import HonestError
+from thermocomp.core.provenance import HonestError, accepted
 
 
 class Gated:
@@ -17,7 +17,7 @@ class Gated:
     @property
     def accepted(self) -> bool:
         """True if the do-no-harm gate accepted this model."""
-        return self.honest_error is not None and self.honest_error.word == "accepted"
+        return self.honest_error is not None and accepted(self.honest_error.word)
 
     def may_lose(self, names: Collection[str]) -> bool:
         """Return whether the model without these inputs is better than no compensation: see `HonestError.may_lose`."""

@@ -56,7 +56,15 @@ class Provenance:
 
 
 #: version of the rules for verdicts; files without this number were judged by older rules
-RULES = 1
+RULES = 2
+
+
+Word = Literal["accepted", "accepted for this duty", "unproven", "refused"]
+
+
+def accepted(word: Word) -> bool:
+    """Return whether a verdict permits a model to run."""
+    return word in ("accepted", "accepted for this duty")
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,7 @@ class HonestError:
         The same without compensation.
     cycles : dict of str to float
         RMS of the residual per unseen cycle.
-    verdict : {'accepted', 'unproven', 'refused'}
+    verdict : {'accepted', 'accepted for this duty', 'unproven', 'refused'}
         Verdict of the do-no-harm gate.
     reason : str
         Reason for the verdict, as text.
@@ -105,7 +113,7 @@ class HonestError:
     none_mae: float
     none_rms: float
     cycles: dict[str, float]
-    verdict: Literal["accepted", "unproven", "refused"]
+    verdict: Word
     reason: str
     units: int = 0
     tried: int = 1
@@ -143,9 +151,9 @@ class HonestError:
         return self.rules == RULES
 
     @property
-    def word(self) -> Literal["accepted", "unproven", "refused"]:
+    def word(self) -> Word:
         """The verdict under the current rules: accepted by other rules counts as unproven."""
-        return self.verdict if self.current or self.verdict != "accepted" else "unproven"
+        return self.verdict if self.current or not accepted(self.verdict) else "unproven"
 
     @property
     def why(self) -> str:
@@ -168,7 +176,7 @@ class HonestError:
 
     def check_may_run(self, target: str) -> None:
         """Raise `InputError` if the model of a target must not run; see `ErrorModel.check_may_run`."""
-        if self.word == "accepted":
+        if accepted(self.word):
             return
         if self.word == "refused":
             raise InputError(f"model of {target} was refused and will not run: {self.reason}")

@@ -15,6 +15,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.network import Network
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.polynomial import Polynomial
+from thermocomp.core.provenance import accepted
 from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.files import jsonfile
@@ -133,13 +134,13 @@ def _check_judged(models: Sequence[ErrorModel], source: str) -> None:
         found = model.honest_error
         if found is None:
             continue
-        if found.verdict == "accepted" and found.current and not (found.units and found.cycles):
+        if accepted(found.verdict) and found.current and not (found.units and found.cycles):
             raise ModelFileError(f"{source}: model {k}: honest_error: accepted, but never judged: the file was altered")
         if found.taken and not all(part.strip() for part in (*found.taken.split(",", 1), "")[:2]):
             raise ModelFileError(
                 f"{source}: model {k}: honest_error: taken by {found.taken[:60]!a}: expected a name and a reason"
             )
-        if found.verdict == "accepted" and found.rms > found.none_rms:
+        if accepted(found.verdict) and found.rms > found.none_rms:
             raise ModelFileError(
                 f"{source}: model {k}: honest_error: accepted with an RMS of {found.rms:g} {model.unit}, above the "
                 f"{found.none_rms:g} {model.unit} without compensation: the file was altered"

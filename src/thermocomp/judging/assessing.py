@@ -16,7 +16,7 @@ from thermocomp.judging import coverage
 from thermocomp.judging.compare import split_by_cycle
 from thermocomp.judging.do_no_harm import Verdict
 from thermocomp.judging.guards import Guard, let_fail
-from thermocomp.judging.judge import cap_alike_units, judge
+from thermocomp.judging.judge import judge
 from thermocomp.judging.leaks import find_learned_rows
 from thermocomp.judging.pieces import explain
 from thermocomp.judging.probing import Probings
@@ -202,8 +202,7 @@ def _assess(
         rules=rules, limits=limits, guard=guard, probings=probings, widening=widening, watched=looked_after,
     )  # fmt: skip
     judging = units(samples, ~known)
-    caps = (*found.verdict.caps, *cap_alike_units(samples, judging))
-    return replace(found, verdict=replace(found.verdict, caps=caps), overall=True, caveat=caveat, learned=n), judging
+    return replace(found, overall=True, caveat=caveat, learned=n), judging
 
 
 def _guard(model: ErrorModel, samples: Samples, watched: Samples | None, known: list[Guard]) -> Guard | None:

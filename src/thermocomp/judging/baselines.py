@@ -90,8 +90,15 @@ def worst_of(errors: Sequence[FloatArray], other: FloatArray, noise: float) -> A
     return found[0] if len(found) == 1 else found[0].worse(found[1])
 
 
-def compare_with_time(units: Sequence[Series], noise: Sequence[float]) -> list[tuple[Against, Against]]:
-    """Return the comparisons of each cycle or file with the baselines `OF_TIME`.
+class OfTime(NamedTuple):
+    """Comparisons with the baselines that know the time."""
+
+    units: tuple[tuple[Against, Against], ...]  #: with each of `OF_TIME`, by cycle or file
+    unlike: float  #: share of the drift, without slow changes, that the mean curve of the others leaves (RMS)
+
+
+def compare_with_time(units: Sequence[Series], noise: Sequence[float]) -> OfTime:
+    """Compare each cycle or file with the baselines `OF_TIME`.
 
     Parameters
     ----------
@@ -102,10 +109,13 @@ def compare_with_time(units: Sequence[Series], noise: Sequence[float]) -> list[t
     """
     varying = _remove_slow_changes(units)
     curves = [u.measured - _mean_curve(units, k) for k, u in enumerate(units)]
-    return [
+    found = [
         (worst_of(u.errors, curve, least), worst_of(v.errors, v.measured, least))
         for u, v, curve, least in zip(units, varying, curves, noise, strict=True)
     ]
+    left = np.concatenate([v.measured - _mean_curve(varying, k) for k, v in enumerate(varying)])
+    every = np.concatenate([v.measured for v in varying])
+    return OfTime(tuple(found), Size.of(left).rms / max(Size.of(every).rms, NO_NOISE))
 
 
 def _mean_curve(units: Sequence[Series], left_out: int) -> FloatArray:

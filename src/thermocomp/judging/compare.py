@@ -12,7 +12,7 @@ from thermocomp.core.inputs import Support
 from thermocomp.judging import do_no_harm
 from thermocomp.judging.diagnostics import Collinearity, collinearity
 from thermocomp.judging.guards import Guard, find_guard
-from thermocomp.judging.judge import cap_alike_units, drop_unreadable, judge, refuse_method
+from thermocomp.judging.judge import drop_unreadable, judge, refuse_method
 from thermocomp.judging.leaks import refuse_leaks
 from thermocomp.judging.pieces import work_through
 from thermocomp.judging.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
@@ -75,7 +75,6 @@ def compare(
     except KeyboardInterrupt:
         if len(done) < len(by_target[0].splits):
             raise
-    capped = cap_alike_units(samples, judging)
     found: list[Assessment] = []
     recommended: list[Recommendation] = []
     finished = 0
@@ -87,7 +86,7 @@ def compare(
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
         best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
-        found += _concluded(mine, verdicts, rules, best, capped)
+        found += _concluded(mine, verdicts, rules, best)
     if robustness and refit:
         found = refit_accepted(found, samples, support, watch=limits is not None, jobs=jobs)
     return Comparison(
@@ -133,10 +132,9 @@ def _concluded(
     verdicts: dict[str, list[do_no_harm.Verdict]],
     rules: Rules,
     best: Recommendation | None,
-    caps: tuple[str, ...],
 ) -> list[Assessment]:
     """Return the results for one target: each method in each block, and over all blocks with its verdict."""
-    whole = {name: do_no_harm.join_verdicts(v, caps=caps) for name, v in verdicts.items()}
+    whole = {name: do_no_harm.join_verdicts(v) for name, v in verdicts.items()}
     after = correct_verdicts(whole, rules.primary, best)
     found = []
     for name, p in parts.items():

@@ -9,13 +9,13 @@ than no compensation in a single one. For the reasons see ``docs/decisions/0020-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy import stats
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.learned import Learned
+from thermocomp.core.provenance import Word, accepted
 from thermocomp.core.size import Size
 from thermocomp.judging.baselines import (
     BASELINES,
@@ -24,14 +24,13 @@ from thermocomp.judging.baselines import (
     REZEROED,
     SLOW,
     Against,
+    OfTime,
     Series,
     compare_with_time,
     rezero,
     worst_of,
 )
 from thermocomp.judging.splits import MIN_ROWS
-
-Word = Literal["accepted", "unproven", "refused"]
 
 #: minimum number of cycles or files for a significance test
 MIN_UNITS = 3
@@ -43,6 +42,8 @@ LEVEL = 0.05
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
 #: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
 TIMES_NOISE, SHARE = 3.0, 0.05
+#: drifts are of one duty if their mean curve leaves less than this share of them, slow changes removed
+UNLIKE = 0.6
 #: reason against acceptance if the effects of noise and lost sensors were not tested
 UNTRIED = "the effects of noise and of a lost sensor were not tested: compare with robustness=True"
 #: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
@@ -139,11 +140,24 @@ class Verdict:
             return {}
         columns = zip(*(u.baselines for u in self.units), strict=True)
         found = dict(zip(self.given, columns, strict=False))
-        series = [u.series for u in self.units if u.series is not None]
-        if len(series) == len(self.units) >= MIN_UNITS and REZEROED not in found:
-            of_time = compare_with_time(series, [u.noise for u in self.units])
-            found |= dict(zip(OF_TIME, zip(*of_time, strict=True), strict=True))
+        if self._of_time is not None:
+            found |= dict(zip(OF_TIME, zip(*self._of_time.units, strict=True), strict=True))
         return found
+
+    @cached_property
+    def _of_time(self) -> OfTime | None:
+        """Comparison with the baselines that know the time; None if there are too few cycles or files."""
+        series = [u.series for u in self.units if u.series is not None]
+        if not len(series) == len(self.units) >= MIN_UNITS or any(
+            len(u.baselines) > len(BASELINES) for u in self.units
+        ):
+            return None
+        return compare_with_time(series, [u.noise for u in self.units])
+
+    @property
+    def one_duty(self) -> bool:
+        """True if the drift is so alike in all cycles or files that they prove one duty only."""
+        return self._of_time is not None and self._of_time.unlike < UNLIKE
 
     @cached_property
     def mean_ratios(self) -> dict[str, float]:
@@ -191,12 +205,14 @@ class Verdict:
         if self._unbeaten:
             return "refused"
         enough = len(self.units) >= MIN_UNITS and self._moving >= MIN_UNITS - 1
-        return "accepted" if enough and not self.caps and self.p_value <= LEVEL else "unproven"
+        if not enough or self.caps or self.p_value > LEVEL:
+            return "unproven"
+        return "accepted for this duty" if self.one_duty else "accepted"
 
     @property
     def accepted(self) -> bool:
         """True if the model may run."""
-        return self.word == "accepted"
+        return accepted(self.word)
 
     @property
     def _moving(self) -> int:
@@ -221,7 +237,8 @@ class Verdict:
     def _why_accepted(self) -> str:
         least = max(self.units, key=lambda u: u.harm)
         others = f"better than {self.worst} and the other baselines"
-        return f"{others}, {self._tested()}; smallest gain in {least.name}: {self._figures(least)}"
+        duty = "; the drift is much the same each time, so other speeds and durations are not proved" * self.one_duty
+        return f"{others}, {self._tested()}; smallest gain in {least.name}: {self._figures(least)}{duty}"
 
     def _why_unproven(self) -> str:
         n, moving = len(self.units), self._moving
@@ -255,8 +272,6 @@ class Verdict:
         """Thermal test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
-        if any("are distinct" in cap for cap in self.caps):
-            return "record cycles at other speeds or on other days"
         if self.caps:
             by_stretch = any("one section" in cap for cap in self.caps)
             way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without this problem"

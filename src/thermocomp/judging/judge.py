@@ -10,7 +10,6 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.learned import Learned
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging import do_no_harm, metrics
-from thermocomp.judging.coverage import find_validity
 from thermocomp.judging.guards import Guard
 from thermocomp.judging.probing import Probings
 from thermocomp.judging.replay import replay_compensated
@@ -149,17 +148,6 @@ def _place(samples: Samples, rows: IntArray) -> tuple[str, FloatArray]:
         return record, begin + samples.time[rows]
     clock = samples.clock()[rows]
     return record, begin + samples.time[rows[0]] + (clock - clock[0]).astype(np.float64)
-
-
-def cap_alike_units(samples: Samples, judging: Judging) -> tuple[str, ...]:
-    """Return a reason against acceptance if the judged cycles or files are too alike; empty if they are not."""
-    covered = find_validity(samples, judging)
-    needed = do_no_harm.MIN_UNITS
-    if covered.independent >= needed or covered.units < needed:
-        return ()
-    return (
-        f"only {covered.independent} of {covered.units} cycles or files are distinct, at least {needed} are needed",
-    )
 
 
 def _caps(

@@ -10,6 +10,7 @@ from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import Word, accepted
 from thermocomp.judging import do_no_harm, metrics
 from thermocomp.judging.diagnostics import Collinearity
 from thermocomp.judging.probing import Probed
@@ -180,11 +181,11 @@ class Assessment:
     @property
     def accepted(self) -> bool:
         """True if the model may run."""
-        return self.word == "accepted"
+        return accepted(self.word)
 
     @property
-    def word(self) -> do_no_harm.Word:
-        """``accepted``, ``unproven`` or ``refused``."""
+    def word(self) -> Word:
+        """``accepted``, ``accepted for this duty``, ``unproven`` or ``refused``."""
         if self.failure or self.caveat:
             return "refused"
         return "unproven" if self._fragile else self.verdict.word
@@ -192,7 +193,7 @@ class Assessment:
     @property
     def _fragile(self) -> str:
         """Effect of noise or a lost sensor on a model that is accepted without them; empty if it is harmless."""
-        if self.robustness is None or self.verdict.word != "accepted":
+        if self.robustness is None or not self.verdict.accepted:
             return ""
         margin = max(u.margin for u in self.verdict.units)  # a stated one applies to the judged errors only
         most = do_no_harm.MOST_MARGIN.get(self.verdict.unit, np.inf)

@@ -10,7 +10,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
-from thermocomp.core.provenance import RULES, HonestError
+from thermocomp.core.provenance import RULES, HonestError, accepted
 from thermocomp.judging import coverage
 from thermocomp.judging.compare import compare
 from thermocomp.judging.guards import find_guard
@@ -88,9 +88,10 @@ def fit(
         progress(f"{overall.target} {method} all rows")
         tried[overall.target] = stress_written(overall, trained.model, samples, let)
         honest = honest_error(tried[overall.target], judging)
-        models.append(
-            replace(trained.model, honest_error=honest, validity=covered, watch=guard.watch if guard else None)
-        )
+        model = trained.model
+        if honest.verdict == "accepted for this duty" and support.policy == "clip":
+            model = replace(model, support=replace(support, policy="fade"))  # outside the duty nothing is proved
+        models.append(replace(model, honest_error=honest, validity=covered, watch=guard.watch if guard else None))
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
     return Fitted(
         tuple(models),
@@ -106,7 +107,7 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         raise InputError(f"{overall.target} cannot be judged: {overall.failure}")
     rms, none = overall.metric("rms"), overall.none_metric("rms")
     word, reason = overall.word, overall.reason
-    if word == "accepted" and rms > none:  # one long cycle, within the margin, against many short ones
+    if accepted(word) and rms > none:  # one long cycle, within the margin, against many short ones
         word, reason = "unproven", f"{reason}; over all rows RMS {rms:.2f}, {none:.2f} without compensation"
     return HonestError(
         protocol=judging.name,

@@ -17,7 +17,7 @@ from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, log_ti
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MEASURED, PREDICTED, RESIDUAL, NONE = "#444444", "#0072B2", "#D55E00", "#999999"
 #: fill of a dot by verdict
-FILLED = {"accepted": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
+FILLED = {"accepted": PREDICTED, "accepted for this duty": PREDICTED, "unproven": "#9ecae1", "refused": "white"}
 SHADE = "#f1f1ee"
 BAND = "#d6e8f5"
 #: maximum length of a name along an axis [characters]
