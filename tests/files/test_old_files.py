@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from thermocomp.core import provenance
 from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Reading
 from thermocomp.files import modelfile
 from thermocomp.live import statefile
@@ -47,6 +49,18 @@ def test_a_model_predicts_the_same(name: str) -> None:
     assert_same(found, EXPECTED[name])
 
 
+@pytest.fixture
+def its_rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge by the rules of that version: by the present ones its models are unproven."""
+    monkeypatch.setattr(provenance, "RULES", 1)
+
+
+def test_its_models_are_unproven_by_the_present_rules() -> None:
+    with pytest.raises(InputError, match=r"unproven and runs in shadow only: judged by older rules: .*; fit it again"):
+        Compensator.of(modelfile.read(OLD / "dynamic.json"), Limits(rate=0.1))
+
+
+@pytest.mark.usefixtures("its_rules")
 def test_a_state_continues_the_same() -> None:
     compensator = Compensator.of(modelfile.read(OLD / "dynamic.json"), Limits(rate=0.1))
     assert compensator.watches
@@ -68,6 +82,7 @@ def test_a_journal_is_exported_the_same() -> None:
     assert_same(found.to_numpy(), expected[:, 1:])
 
 
+@pytest.mark.usefixtures("its_rules")
 def test_a_job_is_continued_the_same(tmp_path: Path) -> None:
     out = tmp_path / "out.ngc"
     options: dict[str, Any] = {"controller": "linuxcnc", "axis": ["z_um=Z"], "unproved": True, "pause": "20 min"}
