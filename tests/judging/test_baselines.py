@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from thermocomp.core.learned import Learned
-from thermocomp.judging.baselines import CURVE, SLOW, compare_errors
+from thermocomp.judging.baselines import CURVE, SLOW, Series, compare_errors, compare_with_time, worst_of
 from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, measure
 
 FloatArray = NDArray[np.float64]
@@ -99,3 +99,21 @@ def test_slow_changes_of_a_recording_make_no_difference(seed: int, n: int, first
     slow = first * u + second * np.cos(np.pi * rng.integers(1, n + 1) * u)
     one, other = (cycles(drift + c * slow, output + c * slow, n).compared[SLOW] for c in (0.0, 1.0))
     np.testing.assert_allclose(np.array(one), np.array(other), atol=1e-6)
+
+
+def test_the_curve_is_that_of_the_others_over_the_time_since_the_start_of_each() -> None:
+    ramp = np.linspace(0.0, 8.0, 50)
+    units = [
+        Series("a", MINUTE * np.arange(60.0 * k, 60.0 * k + 50.0), level + ramp, (np.zeros(50),))
+        for k, level in enumerate((1.0, 2.0, 6.0))
+    ]
+    curves = [curve for curve, _ in compare_with_time(units, [0.01] * 3).units]
+    assert [c.other for c in curves] == pytest.approx([3.0, 1.5, 4.5])
+
+
+def test_of_compensator_and_model_alone_the_worse_counts() -> None:
+    error = np.sin(np.linspace(0, 7, 100))
+    for order in ((0.1, 0.8), (0.8, 0.1)):
+        found = worst_of([left * error for left in order], error, 0.01)
+        assert found.rms == pytest.approx(0.8 * found.other)
+        assert found.agreement == pytest.approx(2 * 0.2 / (1 + 0.2**2))
