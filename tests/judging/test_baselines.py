@@ -1,16 +1,25 @@
 """Baselines: agreement with an error, and the two that know the time only."""
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from smallmachine import small_machine
 
+from thermocomp.core.inputs import Support
 from thermocomp.core.learned import Learned
+from thermocomp.judging import splits, study
 from thermocomp.judging.baselines import CURVE, SLOW, Series, compare_errors, compare_with_time, worst_of
 from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, measure
+from thermocomp.recordings.stacking import stack
+from thermocomp.recordings.starts import COLD
 
 FloatArray = NDArray[np.float64]
+Policy = Literal["clip", "hold", "fade"]
 
 NOTHING = Learned(mean=0.0, last=0.0, noise=0.05, largest=20.0)
 MINUTE = 60.0
@@ -23,7 +32,7 @@ def cycles(measured: FloatArray, predicted: FloatArray, n: int, records: int = 1
     for k in range(n):
         mine = slice(k * rows, (k + 1) * rows)
         record = k * records // n
-        time = MINUTE * (np.arange(k * rows, (k + 1) * rows) - record * len(measured) // records)
+        time = MINUTE * (np.arange(k * rows, (k + 1) * rows, dtype=np.float64) - record * len(measured) // records)
         of = (f"recording {record}", time)
         units.append(measure(str(k), measured[mine], predicted[mine], NOTHING, series=of))
     return Verdict(tuple(units))
@@ -117,3 +126,24 @@ def test_of_compensator_and_model_alone_the_worse_counts() -> None:
         found = worst_of([left * error for left in order], error, 0.01)
         assert found.rms == pytest.approx(0.8 * found.other)
         assert found.agreement == pytest.approx(2 * 0.2 / (1 + 0.2**2))
+
+
+def test_a_model_accepted_for_a_duty_fades_outside_it() -> None:
+    """The same run on six days in other weather, which the sensors show."""
+    days = []
+    for k, phase in enumerate(np.random.default_rng(0).uniform(0, 6, 6)):
+        day = small_machine((2000.0,), seed=k)
+        weather = 2.0 * (np.sin(day.time / 3000.0 + phase) - np.sin(phase))
+        more = {"t1_C": 1.0, "t2_C": 1.0, "t3_C": 1.0, "z_um": 1.5}
+        table = day.table.assign(**{name: day.table[name] + a * weather for name, a in more.items()})
+        days.append(replace(day, name=f"day {k}", table=table))
+    samples = stack(days, ["z_um"], starts=COLD)
+    kinds: list[tuple[Policy, Policy]] = [("clip", "fade"), ("hold", "hold")]
+    for policy, expected in kinds:
+        found = study.fit(samples, "ols", splits.leave_one_file_out(samples), support=Support(policy, 0.1))
+        (model,) = found.models
+        assert model.honest_error is not None
+        assert model.honest_error.word == "accepted for this duty"
+        assert "other speeds and durations are not proved" in model.honest_error.why
+        assert model.accepted
+        assert model.support == Support(expected, 0.1)
