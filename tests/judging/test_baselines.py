@@ -147,3 +147,13 @@ def test_a_model_accepted_for_a_duty_fades_outside_it() -> None:
         assert "other speeds and durations are not proved" in model.honest_error.why
         assert model.accepted
         assert model.support == Support(expected, 0.1)
+
+
+def test_an_output_that_overshoots_agrees_and_is_worse_all_the_same() -> None:
+    """Right for the warm-up of the recording; where it is faster, it has two and a half times the size of the drift."""
+    sizes = np.repeat([1.0, 0.4, 1.6, 0.7, 1.2, 0.5], 80)
+    fast = 4.0 * sizes * np.tile(np.sin(np.linspace(0, 6 * np.pi, 80)), 6)
+    found = cycles(warm_up(480, 150.0) + fast, warm_up(480, 150.0) + 2.5 * fast, 6)
+    assert min(a.agreement for a in found.compared[SLOW]) > 0.5
+    assert found.mean_ratios[SLOW] > 0
+    assert (found.word, found.p_values[SLOW]) == ("unproven", 1.0)
