@@ -80,6 +80,15 @@ def test_a_slow_unit_within_the_margin_does_not_decide_alone() -> None:
     assert Verdict((*good, slow)).word == "accepted"
 
 
+def test_no_model_is_accepted_because_of_limits() -> None:
+    y = drift()
+    limited = measure("a", y, 0.9 * y, NOTHING, alone=-y)
+    assert limited.rms == pytest.approx(2 * limited.none_rms)
+    assert limited.largest == pytest.approx(2 * limited.none_largest)
+    assert limited.baselines[0].agreement == pytest.approx(2 * -1 / 2)
+    assert limited.harmful
+
+
 def test_a_largest_error_does_harm_too() -> None:
     y = drift()
     predicted = 0.9 * y

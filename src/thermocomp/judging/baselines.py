@@ -95,6 +95,7 @@ class OfTime(NamedTuple):
 
     units: tuple[tuple[Against, Against], ...]  #: with each of `OF_TIME`, by cycle or file
     unlike: float  #: share of the drift, without slow changes, that the mean curve of the others leaves (RMS)
+    sizes: float  #: largest RMS of the drift in a cycle or file, without slow changes, relative to the smallest
 
 
 def compare_with_time(units: Sequence[Series], noise: Sequence[float]) -> OfTime:
@@ -114,8 +115,9 @@ def compare_with_time(units: Sequence[Series], noise: Sequence[float]) -> OfTime
         for u, v, curve, least in zip(units, varying, curves, noise, strict=True)
     ]
     left = np.concatenate([v.measured - _mean_curve(varying, k) for k, v in enumerate(varying)])
-    every = np.concatenate([v.measured for v in varying])
-    return OfTime(tuple(found), Size.of(left).rms / max(Size.of(every).rms, NO_NOISE))
+    sizes = [max(Size.of(v.measured).rms, NO_NOISE) for v in varying]
+    every = Size.of(np.concatenate([v.measured for v in varying])).rms
+    return OfTime(tuple(found), Size.of(left).rms / max(every, NO_NOISE), max(sizes) / min(sizes))
 
 
 def _mean_curve(units: Sequence[Series], left_out: int) -> FloatArray:

@@ -42,8 +42,9 @@ LEVEL = 0.05
 MOST_MARGIN = {"um": 2.0, "urad": 10.0}
 #: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
 TIMES_NOISE, SHARE = 3.0, 0.05
-#: drifts are of one duty if their mean curve leaves less than this share of them, slow changes removed
-UNLIKE = 0.6
+#: drifts are of one duty if, slow changes removed, their mean curve leaves less than this share of them, and if the
+#: largest is less than this multiple of the smallest
+UNLIKE, SIZES = 0.6, 3.0
 #: reason against acceptance if the effects of noise and lost sensors were not tested
 UNTRIED = "the effects of noise and of a lost sensor were not tested: compare with robustness=True"
 #: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
@@ -157,7 +158,8 @@ class Verdict:
     @property
     def one_duty(self) -> bool:
         """True if the drift is so alike in all cycles or files that they prove one duty only."""
-        return self._of_time is not None and self._of_time.unlike < UNLIKE
+        of_time = self._of_time
+        return of_time is not None and of_time.unlike < UNLIKE and of_time.sizes < SIZES
 
     @cached_property
     def mean_ratios(self) -> dict[str, float]:
