@@ -1,6 +1,7 @@
 """Baselines: agreement with an error, and the two that know the time only."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -14,9 +15,12 @@ from thermocomp.core.inputs import Support
 from thermocomp.core.learned import Learned
 from thermocomp.judging import splits, study
 from thermocomp.judging.baselines import CURVE, SLOW, Series, compare_errors, compare_with_time, worst_of
+from thermocomp.judging.compare import compare
 from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, measure
+from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
-from thermocomp.recordings.starts import COLD
+from thermocomp.recordings.starts import COLD, Start
 
 FloatArray = NDArray[np.float64]
 Policy = Literal["clip", "hold", "fade"]
@@ -157,3 +161,33 @@ def test_an_output_that_overshoots_agrees_and_is_worse_all_the_same() -> None:
     assert min(a.agreement for a in found.compared[SLOW]) > 0.5
     assert found.mean_ratios[SLOW] > 0
     assert (found.word, found.p_values[SLOW]) == ("unproven", 1.0)
+
+
+def test_files_that_continue_each_other_are_one_recording() -> None:
+    """By their time stamps each names only the file before it."""
+    whole = small_machine((1000.0, 2600.0, 1800.0), seed=4)
+    ends, files = [0, 200, 400, 600], list[Recording]()
+    for k, (first, end) in enumerate(pairwise(ends)):
+        table = whole.table.iloc[first:end].reset_index(drop=True)
+        cycle = (Cycle(str(k), 0, end - first),)
+        files.append(replace(whole, name=f"part {k}", time=whole.time[: end - first], table=table, cycles=cycle))
+    starts = [COLD, *(Start("continued", "stated", (before,), MINUTE) for before in files[:2])]
+    samples = stack(files, ["z_um"], starts=starts)
+    (found,) = compare(samples, ["ols"], splits.leave_one_file_out(samples), robustness=False, refit=False).overall()
+    series = [u.series for u in found.verdict.units]
+    assert all(s is not None and s.record == files[0].fingerprint for s in series)
+    np.testing.assert_allclose(np.concatenate([s.time for s in series if s is not None]), whole.time)
+
+
+def test_the_files_of_a_day_follow_each_other_by_their_time_stamps() -> None:
+    stamps = [f"2026-03-{day:02d}T{hour:02d}:00:00" for day in (2, 3) for hour in (6, 14)]
+    files = [
+        replace(small_machine((speed,), seed=k), name=f"run {k}", start=stamp)
+        for k, (speed, stamp) in enumerate(zip((1000.0, 2600.0, 1800.0, 3000.0), stamps, strict=True))
+    ]
+    samples = stack(files, ["z_um"], starts=COLD)
+    (found,) = compare(samples, ["ols"], splits.leave_one_day_out(samples), robustness=False, refit=False).overall()
+    for unit in found.verdict.units:
+        assert unit.series is not None
+        own = files[0].time
+        np.testing.assert_allclose(unit.series.time, np.r_[own, 8 * 3600.0 + own])

@@ -1,10 +1,12 @@
 """Training rows in other files: left out of `assess` and counted; refused where they would be learned and judged."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 from smallmachine import small_machine
 
 from thermocomp import simulate
@@ -196,7 +198,7 @@ def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> Non
     assert overall.reason.endswith("the drift is much the same each time: record other speeds and durations")
 
 
-LEAKS = {
+LEAKS: dict[str, Callable[[NDArray[np.float64], np.random.Generator], NDArray[np.float64]]] = {
     "a straight line": lambda y, _: 22.0 + 0.2 * y,
     "with noise": lambda y, rng: 22.0 + 0.2 * y + 0.05 * rng.normal(size=len(y)),
     "rounded": lambda y, _: np.round(31.0 - 0.3 * y, 1),
