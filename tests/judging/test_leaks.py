@@ -208,7 +208,7 @@ LEAKS: dict[str, Callable[[NDArray[np.float64], np.random.Generator], NDArray[np
 @pytest.mark.parametrize("kind", LEAKS)
 def test_a_temperature_that_is_computed_from_the_displacement_is_named(kind: str) -> None:
     (recording,) = simulate("stepwise2017")
-    table = recording.table.assign(t_leak_C=LEAKS[kind](recording.table["x1_um"], np.random.default_rng(0)))
+    table = recording.table.assign(t_leak_C=LEAKS[kind](recording.table["x1_um"].to_numpy(), np.random.default_rng(0)))
     leaking = replace(
         recording, table=table, channels=(*recording.channels, Channel("t_leak_C", "temperature", "degC", ""))
     )
