@@ -287,7 +287,7 @@ class Verdict:
 
     def _more_units(self) -> str:
         """Advice if all required cycles or files were judged."""
-        if self.worst == CURVE:
+        if self.worst == CURVE and self.one_duty:
             return "the drift is much the same each time: record other speeds and durations"
         if self.worst == SLOW and len({u.series.record for u in self.units if u.series}) < MIN_UNITS:
             return (
