@@ -1,23 +1,19 @@
 """Training rows in other files: left out of `assess` and counted; refused where they would be learned and judged."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.typing import NDArray
 from smallmachine import small_machine
 
-from thermocomp import simulate
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.baselines import CURVE
 from thermocomp.judging.choice import Settings
 from thermocomp.judging.compare import compare
-from thermocomp.judging.leaks import find_leaks, find_learned_rows
+from thermocomp.judging.leaks import find_learned_rows
 from thermocomp.judging.selecting import select
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle
 from thermocomp.recordings.recording import Recording
@@ -196,33 +192,3 @@ def test_copies_of_one_cycle_are_one_unit(models: tuple[ErrorModel, ...]) -> Non
     assert overall.word == "unproven"
     assert overall.reason.startswith(f"not shown to be better than {CURVE}: RMS ")
     assert overall.reason.endswith("the drift is much the same each time: record other speeds and durations")
-
-
-LEAKS: dict[str, Callable[[NDArray[np.float64], np.random.Generator], NDArray[np.float64]]] = {
-    "a straight line": lambda y, _: 22.0 + 0.2 * y,
-    "with noise": lambda y, rng: 22.0 + 0.2 * y + 0.05 * rng.normal(size=len(y)),
-    "rounded": lambda y, _: np.round(31.0 - 0.3 * y, 1),
-}
-
-
-@pytest.mark.parametrize("kind", LEAKS)
-def test_a_temperature_that_is_computed_from_the_displacement_is_named(kind: str) -> None:
-    (recording,) = simulate("stepwise2017")
-    table = recording.table.assign(t_leak_C=LEAKS[kind](recording.table["x1_um"].to_numpy(), np.random.default_rng(0)))
-    leaking = replace(
-        recording, table=table, channels=(*recording.channels, Channel("t_leak_C", "temperature", "degC", ""))
-    )
-    samples = stack([leaking], ["x1_um"])
-    assert list(find_leaks(samples, 0, [c.name for c in samples.inputs])) == ["t_leak_C"]
-    (overall,) = (a for a in compare(samples, ["ols"], splits.leave_one_cycle_out(samples), robustness=False).overall())
-    assert overall.word == "unproven"
-    assert overall.reason.startswith("t_leak_C follows x1_um without lag, better than a temperature can (a straight")
-
-
-@pytest.mark.parametrize("experiment", ["demo", "hwang", "stepwise2017", "chen1996", "etve", "random", "wessel-tool"])
-def test_no_temperature_of_a_machine_is_a_leak(experiment: str) -> None:
-    for physics in ("linear", "nonlinear"):
-        recordings = simulate(experiment, physics=physics)
-        samples = stack(recordings, [c.name for c in recordings[0].displacements])
-        names = [c.name for c in samples.inputs]
-        assert [find_leaks(samples, k, names) for k in range(len(samples.targets))] == [{}] * len(samples.targets)

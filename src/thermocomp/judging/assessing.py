@@ -17,7 +17,7 @@ from thermocomp.judging.compare import split_by_cycle
 from thermocomp.judging.do_no_harm import Verdict
 from thermocomp.judging.guards import Guard, let_fail
 from thermocomp.judging.judge import judge
-from thermocomp.judging.leaks import cap_leaks, find_leaks, find_learned_rows
+from thermocomp.judging.leaks import find_learned_rows
 from thermocomp.judging.pieces import explain
 from thermocomp.judging.probing import Probings
 from thermocomp.judging.replay import are_absolute, stack_for
@@ -202,7 +202,6 @@ def _assess(
         rules=rules, limits=limits, guard=guard, probings=probings, widening=widening, watched=looked_after,
     )  # fmt: skip
     judging = units(samples, ~known)
-    found = cap_leaks(found, find_leaks(samples, 0, model.sensors))
     return replace(found, overall=True, caveat=caveat, learned=n), judging
 
 

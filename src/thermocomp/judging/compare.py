@@ -13,7 +13,7 @@ from thermocomp.judging import do_no_harm
 from thermocomp.judging.diagnostics import Collinearity, collinearity
 from thermocomp.judging.guards import Guard, find_guard
 from thermocomp.judging.judge import drop_unreadable, judge, refuse_method
-from thermocomp.judging.leaks import cap_leaks, find_leaks, refuse_leaks
+from thermocomp.judging.leaks import refuse_leaks
 from thermocomp.judging.pieces import work_through
 from thermocomp.judging.recommend import Inner, Recommendation, correct_verdicts, inner_splits, recommend, score
 from thermocomp.judging.refit import refit_accepted
@@ -79,8 +79,7 @@ def compare(
     recommended: list[Recommendation] = []
     finished = 0
     for k, target in enumerate(samples.targets):
-        leaks = find_leaks(samples, k, [c.name for c in samples.inputs])
-        parts = [(name, cap_leaks(a, leaks)) for (of, name, _), a in zip(pieces, done, strict=False) if of == k]
+        parts = [(name, a) for (of, name, _), a in zip(pieces, done, strict=False) if of == k]
         if not (mine := _complete(parts, len(by_target[k].splits))):
             continue
         finished += len(mine)

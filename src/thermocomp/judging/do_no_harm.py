@@ -34,6 +34,8 @@ from thermocomp.judging.splits import MIN_ROWS
 
 #: minimum number of cycles or files for a significance test
 MIN_UNITS = 3
+#: agreement of a model that explains a twentieth of an error: one that explains less is not accepted, however surely
+LEAST_AGREEMENT = 0.1
 #: smaller p-values are not told apart: the test assumes normal values
 LEAST_P = 0.001
 #: significance level of the one-sided test
@@ -175,7 +177,7 @@ class Verdict:
         if len(self.units) < MIN_UNITS:
             return dict.fromkeys(self.compared, 1.0)
         return {
-            name: _p_above_zero([a.agreement for a in column]) if self.mean_ratios[name] < 0 else 1.0
+            name: _p_above_least([a.agreement for a in column]) if self.mean_ratios[name] < 0 else 1.0
             for name, column in self.compared.items()
         }
 
@@ -317,10 +319,10 @@ class Verdict:
         return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
 
 
-def _p_above_zero(agreements: Sequence[float]) -> float:
-    """Return the p-value of a one-sided t-test of the mean."""
-    mean, error = float(np.mean(agreements)), float(stats.sem(agreements))
-    return float(stats.t.sf(mean / error, len(agreements) - 1)) if error > 0 else float(mean <= 0)
+def _p_above_least(agreements: Sequence[float]) -> float:
+    """Return the p-value of a one-sided t-test whether the mean is above `LEAST_AGREEMENT`."""
+    beyond, error = float(np.mean(agreements)) - LEAST_AGREEMENT, float(stats.sem(agreements))
+    return float(stats.t.sf(beyond / error, len(agreements) - 1)) if error > 0 else float(beyond <= 0)
 
 
 def measure(
