@@ -80,7 +80,7 @@ def compare(
         TOML mapping file: role and unit of each column.
     support : {'clip', 'hold', 'fade'}
         Behaviour of a model outside its training range: clip its inputs, hold its last output, or fade its output to
-        zero.
+        zero. With ``clip``, a model accepted for its duty only fades.
     margin : float
         Margin by which the training range of each input is extended at both ends, as a fraction of the range.
     robustness : bool

@@ -7,7 +7,7 @@ than no compensation in a single one. For the reasons see ``docs/decisions/0020-
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -151,9 +151,8 @@ class Verdict:
     def _of_time(self) -> OfTime | None:
         """Comparison with the baselines that know the time; None if there are too few cycles or files."""
         series = [u.series for u in self.units if u.series is not None]
-        if not len(series) == len(self.units) >= MIN_UNITS or any(
-            len(u.baselines) > len(BASELINES) for u in self.units
-        ):
+        stretch = any(len(u.baselines) > len(BASELINES) for u in self.units)
+        if stretch or not len(series) == len(self.units) >= MIN_UNITS:
             return None
         return compare_with_time(series, [u.noise for u in self.units])
 
@@ -388,16 +387,6 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 def margin_of(learned: Learned, unit: str = "um") -> float:
     """Return the default of the tolerated degradation in a single cycle or file [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
-
-
-def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
-    """Correct the verdicts on several methods for their number (Holm 1979)."""
-    n = len(verdicts)
-    raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])
-    order = np.argsort(raw, kind="stable")
-    corrected = np.empty(n)
-    corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (n - np.arange(n))), 1.0)
-    return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]
 
 
 def _count(n: int, what: str) -> str:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermocomp.judging import do_no_harm
 from thermocomp.judging.baselines import NO_NOISE
+from thermocomp.judging.do_no_harm import Verdict, join_verdicts
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
@@ -96,13 +96,13 @@ class Recommendation:
     target: str
     method: str
     chosen: tuple[str, ...]
-    verdict: do_no_harm.Verdict
+    verdict: Verdict
 
 
 def recommend(
     target: str,
     methods: Sequence[str],
-    parts: Mapping[str, Sequence[do_no_harm.Verdict]],
+    parts: Mapping[str, Sequence[Verdict]],
     inner: Mapping[str, Sequence[Sequence[float]]],
     inners: Sequence[Inner],
 ) -> Recommendation | None:
@@ -125,12 +125,10 @@ def recommend(
     chosen = tuple(methods[k] for k in best)
     judged = [parts[name][u] for u, name in enumerate(chosen)]
     outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
-    return Recommendation(
-        target, methods[int(np.argmin(outer))], chosen, do_no_harm.join_verdicts(judged, about="the choice")
-    )
+    return Recommendation(target, methods[int(np.argmin(outer))], chosen, join_verdicts(judged, about="the choice"))
 
 
-def _log(verdict: do_no_harm.Verdict) -> float:
+def _log(verdict: Verdict) -> float:
     """Return the logarithm of a method's error on a block; infinite if it failed, nan if there were too few rows."""
     if not verdict.units:
         return np.inf if verdict.refusal else np.nan
@@ -138,10 +136,10 @@ def _log(verdict: do_no_harm.Verdict) -> float:
 
 
 def correct_verdicts(
-    verdicts: Mapping[str, do_no_harm.Verdict], primary: str | None, found: Recommendation | None
-) -> dict[str, do_no_harm.Verdict]:
+    verdicts: Mapping[str, Verdict], primary: str | None, found: Recommendation | None
+) -> dict[str, Verdict]:
     """Correct the verdicts on the methods tried for one target for the number of methods."""
-    after = dict(zip(verdicts, do_no_harm.holm(list(verdicts.values())), strict=True))
+    after = dict(zip(verdicts, holm(list(verdicts.values())), strict=True))
     if primary is not None:
         after[primary] = replace(after[primary], p=None, about="primary method set before the evaluation")
     elif found is not None and found.verdict.accepted:
@@ -154,3 +152,13 @@ def correct_verdicts(
             "of the test",
         )
     return after
+
+
+def holm(verdicts: Sequence[Verdict]) -> list[Verdict]:
+    """Correct the verdicts on several methods for their number (Holm 1979)."""
+    n = len(verdicts)
+    raw = np.array([v.p_values[v.worst] if v.units else 1.0 for v in verdicts])
+    order = np.argsort(raw, kind="stable")
+    corrected = np.empty(n)
+    corrected[order] = np.minimum(np.maximum.accumulate(raw[order] * (n - np.arange(n))), 1.0)
+    return [replace(v, p=float(p), tried=n) for v, p in zip(verdicts, corrected, strict=True)]

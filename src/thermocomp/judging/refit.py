@@ -30,6 +30,12 @@ def stress_written(judged: Assessment, model: ErrorModel, samples: Samples, guar
     return replace(judged, robustness=worse(judged.robustness, own))
 
 
+def support_of(judged: Assessment, support: Support) -> Support:
+    """Return the support of the model written to the file: outside of a duty that alone is proved, it fades."""
+    limited = judged.verdict.word == "accepted for this duty" and support.policy == "clip"
+    return replace(support, policy="fade") if limited else support
+
+
 def refit_accepted(
     judged: Sequence[Assessment], samples: Samples, support: Support, *, watch: bool, jobs: int
 ) -> list[Assessment]:
@@ -44,7 +50,9 @@ def refit_accepted(
 
 def _refit(samples: Samples, support: Support, guard: Guard | None, judged: Assessment) -> Assessment:
     k = [t.name for t in samples.targets].index(judged.target)
-    written = train(judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support)
+    written = train(
+        judged.model, samples, k, np.ones(len(samples), dtype=np.bool_), support=support_of(judged, support)
+    )
     return stress_written(judged, written.model, samples, guard)
 
 

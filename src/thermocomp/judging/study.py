@@ -14,7 +14,7 @@ from thermocomp.core.provenance import RULES, HonestError, accepted
 from thermocomp.judging import coverage
 from thermocomp.judging.compare import compare
 from thermocomp.judging.guards import find_guard
-from thermocomp.judging.refit import stress_written
+from thermocomp.judging.refit import stress_written, support_of
 from thermocomp.judging.results import Assessment, Comparison, Rules
 from thermocomp.judging.splits import Judging
 from thermocomp.models.base import ThermalRegressor
@@ -86,11 +86,9 @@ def fit(
     models, tried = list[ErrorModel](), dict[str, Assessment]()
     for overall, trained in zip(comparison.overall(), written, strict=True):
         progress(f"{overall.target} {method} all rows")
-        tried[overall.target] = stress_written(overall, trained.model, samples, let)
+        model = replace(trained.model, support=support_of(overall, support))
+        tried[overall.target] = stress_written(overall, model, samples, let)
         honest = honest_error(tried[overall.target], judging)
-        model = trained.model
-        if honest.verdict == "accepted for this duty" and support.policy == "clip":
-            model = replace(model, support=replace(support, policy="fade"))  # outside the duty nothing is proved
         models.append(replace(model, honest_error=honest, validity=covered, watch=guard.watch if guard else None))
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
     return Fitted(

@@ -1,12 +1,13 @@
 """Maximal correlation of small sets of temperatures with every displacement of every test."""
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import effective_n_jobs
 from numpy.typing import ArrayLike
 
 from thermocomp.core.arrays import BoolArray, FloatArray
@@ -121,14 +122,15 @@ def maximal_correlations(
     how = (members[order], half_window, tolerance, max_sweeps, converged)
     work = [(tables[k][0], tables[k][1][:, d], *how) for k, d in pieces]
     complete = True
-    try:
-        threads = Parallel(n_jobs=jobs, prefer="threads", return_as="generator")
-        found = threads(delayed(_psi)(piece) for piece in work) if share is None else share(_psi, work)
-        for (k, d), values in zip(pieces, found, strict=True):
-            psi[d, order, k] = values
-            progress(f"{tests[k].name} displacement {d + 1} of {n_displacements}: {len(chosen)} subsets")
-    except KeyboardInterrupt:
-        complete = False
+    with ThreadPoolExecutor(effective_n_jobs(jobs)) as threads:
+        found = threads.map(_psi, work) if share is None else share(_psi, work)
+        try:
+            for (k, d), values in zip(pieces, found, strict=True):
+                psi[d, order, k] = values
+                progress(f"{tests[k].name} displacement {d + 1} of {n_displacements}: {len(chosen)} subsets")
+        except KeyboardInterrupt:
+            complete = False
+            threads.shutdown(wait=False, cancel_futures=True)
     return MaximalCorrelations(psi, chosen, tuple(t.name for t in tests), complete)
 
 
