@@ -11,8 +11,8 @@ Two baselines know the time only:
 - the mean curve of the other cycles or files over the time since their start, which is perfect for a drift that is the
   same each time;
 - no compensation, with slow changes removed from drift and model: cycles of one recording share its warm-up, its trend
-  and its days, and a model that reproduces these is not proved by them. Removed is what is slower than a cycle or file:
-  a trend, waves with periods down to twice its duration, and warm-ups of all time constants from the start of the
+  and its days, and a model that reproduces these is not proved by them. Removed is what is no faster than a cycle or
+  file: a trend, waves with periods down to its mean duration, and warm-ups of all time constants from the start of the
   recording. A recording that is a single cycle or file shares nothing; there only a trend is removed, which several
   recordings of a day have in common. See ``docs/decisions/0048-proof.md``.
 """
@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.size import Size
@@ -34,6 +35,8 @@ SLOW = "no compensation, slow changes removed from both"
 #: baselines that know the time
 OF_TIME = (CURVE, SLOW)
 REZERO_ROWS = 5
+#: agreement of a model that explains a twentieth of an error: one that explains less is not accepted, however surely
+LEAST_AGREEMENT = 0.1
 #: lower bound of the noise of a probe [um]
 NO_NOISE = 1e-3
 #: an error below this multiple of the noise is not explained by anything
@@ -88,6 +91,12 @@ def worst_of(errors: Sequence[FloatArray], other: FloatArray, noise: float) -> A
     """Return the less favourable comparison of several errors of a model with a baseline's error."""
     found = [compare_errors(e, other, noise) for e in errors]
     return found[0] if len(found) == 1 else found[0].worse(found[1])
+
+
+def p_above_least(agreements: Sequence[float]) -> float:
+    """Return the p-value of a one-sided t-test whether the mean is above `LEAST_AGREEMENT`."""
+    beyond, error = float(np.mean(agreements)) - LEAST_AGREEMENT, float(stats.sem(agreements))
+    return float(stats.t.sf(beyond / error, len(agreements) - 1)) if error > 0 else float(beyond <= 0)
 
 
 class OfTime(NamedTuple):
@@ -150,7 +159,7 @@ def _slow_terms(times: Sequence[FloatArray]) -> FloatArray:
     u = (time - time.min()) / max(float(np.ptp(time)), 1e-9)
     terms = [np.ones_like(u), u]
     if len(times) > 1:
-        terms += [np.cos(np.pi * k * u) for k in range(1, len(times) + 1)]
+        terms += [np.cos(np.pi * k * u) for k in range(1, 2 * len(times) + 1)]
         terms += [np.exp(-u / tau) for tau in WARM_UPS]
     return np.stack(terms, axis=1)
 

@@ -27,15 +27,15 @@ from thermocomp.judging.baselines import (
     OfTime,
     Series,
     compare_with_time,
+    p_above_least,
     rezero,
     worst_of,
 )
+from thermocomp.judging.repeats import group_repeats
 from thermocomp.judging.splits import MIN_ROWS
 
 #: minimum number of cycles or files for a significance test
 MIN_UNITS = 3
-#: agreement of a model that explains a twentieth of an error: one that explains less is not accepted, however surely
-LEAST_AGREEMENT = 0.1
 #: smaller p-values are not told apart: the test assumes normal values
 LEAST_P = 0.001
 #: significance level of the one-sided test
@@ -156,11 +156,27 @@ class Verdict:
             return None
         return compare_with_time(series, [u.noise for u in self.units])
 
-    @property
+    @cached_property
     def one_duty(self) -> bool:
         """True if the drift is so alike in all cycles or files that they prove one duty only."""
         of_time = self._of_time
-        return of_time is not None and of_time.unlike < UNLIKE and of_time.sizes < SIZES
+        alike = of_time is not None and of_time.unlike < UNLIKE and of_time.sizes < SIZES
+        return alike or self._p_without_repeats > LEVEL
+
+    @property
+    def _p_without_repeats(self) -> float:
+        """P-value of the test in which cycles or files that repeat each other count once; 0 if there are none."""
+        series = [u.series for u in self.units if u.series is not None]
+        if not len(series) == len(self.units) >= MIN_UNITS:
+            return 0.0
+        groups = group_repeats(series)
+        if len(groups) == len(self.units):
+            return 0.0
+        if len(groups) < MIN_UNITS:
+            return 1.0
+        columns = [np.array([a.agreement for a in c]) for c in self.compared.values()]
+        worst = max(p_above_least([float(c[g].mean()) for g in groups]) for c in columns)
+        return worst * (1 if self.p is None else self.tried)
 
     @cached_property
     def mean_ratios(self) -> dict[str, float]:
@@ -176,7 +192,7 @@ class Verdict:
         if len(self.units) < MIN_UNITS:
             return dict.fromkeys(self.compared, 1.0)
         return {
-            name: _p_above_least([a.agreement for a in column]) if self.mean_ratios[name] < 0 else 1.0
+            name: p_above_least([a.agreement for a in column]) if self.mean_ratios[name] < 0 else 1.0
             for name, column in self.compared.items()
         }
 
@@ -316,12 +332,6 @@ class Verdict:
     def _pooled(self, name: str) -> str:
         mine, other = np.sqrt(np.mean(np.square([(a.rms, a.other) for a in self.compared[name]]), axis=0))
         return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
-
-
-def _p_above_least(agreements: Sequence[float]) -> float:
-    """Return the p-value of a one-sided t-test whether the mean is above `LEAST_AGREEMENT`."""
-    beyond, error = float(np.mean(agreements)) - LEAST_AGREEMENT, float(stats.sem(agreements))
-    return float(stats.t.sf(beyond / error, len(agreements) - 1)) if error > 0 else float(beyond <= 0)
 
 
 def measure(
