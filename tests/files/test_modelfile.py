@@ -109,7 +109,7 @@ def test_cut_anywhere_is_told_and_never_half_used() -> None:
 def test_cut_in_half_says_so() -> None:
     text = modelfile.dumps([model()])
     with pytest.raises(ModelFileError, match="is incomplete"):
-        modelfile.loads(text[: len(text) // 2])
+        modelfile.loads(text[: text.index('"inputs"')])
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,19 @@
 
 import base64
 import binascii
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import SettingError
 
 Marks = NDArray[np.uint32]
+
+#: largest size of an unpacked excerpt [byte]
+MOST_BYTES = 100_000
 
 
 def pack_marks(marks: Marks) -> str:
@@ -28,6 +33,52 @@ def unpack_marks(text: str) -> Marks:
             f"fingerprints {text[:12]!r}...: {len(content)} bytes are not a whole number of 32-bit numbers"
         )
     return np.frombuffer(content, dtype="<u4").astype(np.uint32)
+
+
+def pack_values(values: FloatArray, step: float) -> str:
+    """Return values, rounded to a step, as text: the step, a space, and their compressed differences."""
+    differences = np.diff(np.rint(values / step), prepend=0.0)
+    if np.abs(differences).max(initial=0.0) > np.iinfo(np.int16).max:
+        return pack_values(values, 2.0 * step)
+    packed = zlib.compress(differences.astype("<i2").tobytes(), 9)
+    return f"{step:.9g} {base64.b64encode(packed).decode('ascii')}"
+
+
+def unpack_values(text: str) -> FloatArray:
+    """Return the values in a text written by `pack_values`."""
+    step, _, packed = text.partition(" ")
+    try:
+        content = zlib.decompressobj().decompress(base64.b64decode(packed.encode("ascii"), validate=True), MOST_BYTES)
+        return np.cumsum(np.frombuffer(content, dtype="<i2"), dtype=np.float64) * float(step)
+    except (ValueError, zlib.error) as e:
+        raise SettingError(f"excerpt {text[:12]!r}...: not a step and compressed values: {e}") from e
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """Rows of training data at equal intervals, with the noise of the sensors.
+
+    Parameters
+    ----------
+    row : int
+        First row, counted through all tests.
+    interval : float
+        Time between two rows [s].
+    values : dict of str to str
+        Values per channel relative to the first row, the target first, as text of `pack_values`.
+    """
+
+    row: int
+    interval: float
+    values: dict[str, str]
+
+    def __post_init__(self) -> None:
+        if self.row < 0 or not 0 < self.interval < np.inf:
+            raise SettingError(f"excerpt: row {self.row} and interval {self.interval} s must not be negative or zero")
+        if not self.values:
+            raise SettingError("excerpt: there are no values; expected those of at least one target")
+        if len({len(unpack_values(text)) for text in self.values.values()}) > 1:
+            raise SettingError(f"excerpt: {', '.join(self.values)} have different numbers of values")
 
 
 @dataclass(frozen=True)
@@ -78,12 +129,15 @@ class Prints:
         Rounding step of differences per channel, the target first [its unit].
     runs : tuple of Runs
         One per stride.
+    excerpts : tuple of Excerpt
+        Rows in which copies are recognised that were resampled, shifted in time, rounded or made noisy.
     """
 
     interval: float
     learned: tuple[tuple[int, int], ...]
     steps: dict[str, float]
     runs: tuple[Runs, ...]
+    excerpts: tuple[Excerpt, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.interval < np.inf:

@@ -6,7 +6,7 @@ from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.splits import Judging
-from thermocomp.recordings.overlaps import overlap, repeats
+from thermocomp.recordings.overlaps import altered_copies, overlap, repeats
 from thermocomp.recordings.samples import Samples
 
 #: a test with a smaller fraction of new rows is not judged
@@ -38,8 +38,7 @@ def find_learned_rows(model: ErrorModel, samples: Samples) -> BoolArray:
 
 def refuse_leaks(samples: Samples, judging: Judging) -> None:
     """Reject data in which a row occurs twice, if one copy is used for training and the other for judging."""
-    for target in range(len(samples.targets)):
-        source = repeats(samples, target)
+    for source in (*(repeats(samples, k) for k in range(len(samples.targets))), altered_copies(samples)):
         copies = np.flatnonzero(source >= 0)
         for split in judging.splits:
             learn, judge = split.learn[copies], split.judge[copies]

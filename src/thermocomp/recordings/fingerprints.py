@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.fingerprints import Prints, Runs, pack_marks
+from thermocomp.recordings.excerpts import take_excerpts
 from thermocomp.recordings.samples import Samples
 
 Marks = NDArray[np.uint32]
@@ -22,9 +23,9 @@ LENGTH = 20
 #: strides of the long runs [rows]; the first at which a run spans at most a third of the recording is used
 LONG = (60, 12, 6, 4, 2)
 #: number of inputs whose runs are stored
-INPUTS = 4
+INPUTS = 3
 #: maximum size of the fingerprints in a model file [byte]; base64 text is a third larger
-BYTES = 14_000
+BYTES = 11_700
 #: a run with a half that has more distinct continuations than this carries too little information
 WAYS = 4
 #: a run that recurs within this number of its lengths is periodic
@@ -95,13 +96,14 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     for stride, windows in found.items():
         reach = LENGTH * stride
         whole = learned[reach + 1 :] == learned[: len(rows.at) - reach]
-        share = (2 if stride == 1 else 1) / (1 if len(found) == 1 else 3)
+        share = 1.0 if len(found) == 1 else 0.6 if stride == 1 else 0.4
         most = int(share * BYTES / (4 * (len(names) + 2))) if thin else len(rows.at)
         runs.append(_kept(windows, names, whole, stride, rows.at, most))
     if not any(run.rows for run in runs):
         return None
     steps = {name: float(scales[name].step) for name in names}
-    return Prints(samples.interval(learn), _stretches(samples, learn), steps, tuple(runs))
+    excerpts = take_excerpts(samples, target, learn) if thin else ()
+    return Prints(samples.interval(learn), _stretches(samples, learn), steps, tuple(runs), excerpts)
 
 
 # -- runs ----------------------------------------------------------------------------------------------------------

@@ -1,11 +1,12 @@
 """Recognition of the training rows of a model in any file; see the decision `0019-overlap`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from thermocomp.core.arrays import IntArray
-from thermocomp.core.fingerprints import Prints, Runs, unpack_marks
+from thermocomp.core.fingerprints import Excerpt, Prints, Runs, unpack_marks
+from thermocomp.recordings.excerpts import find_excerpts, take_excerpts
 from thermocomp.recordings.fingerprints import LENGTH, Marks, TargetRows, find_rows, fingerprint, hash_runs
 from thermocomp.recordings.samples import Samples
 
@@ -13,6 +14,8 @@ from thermocomp.recordings.samples import Samples
 ALONE = 5
 #: relative difference of intervals below which two tests have the same sampling rate
 SAME_RATE = 0.05
+#: number of excerpts of each test that is compared with the others of a recording
+PER_TEST = 3
 
 
 def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
@@ -24,7 +27,10 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
         Approximate training row, counted through all tests; -1 where a row is new.
     """
     everything = np.ones(len(samples), dtype=np.bool_)
-    return _overlap(prints, samples, target, samples.interval(everything), own=False)
+    source = _overlap(prints, samples, target, samples.interval(everything), own=False)
+    for k in range(len(samples.test_names)):
+        _add_copies(source, prints.excerpts, prints.learned, samples, target, k)
+    return source
 
 
 def repeats(samples: Samples, target: int) -> IntArray:
@@ -55,6 +61,40 @@ def repeats(samples: Samples, target: int) -> IntArray:
                 found = _overlap(prints, samples.take(rows), target, rates[other], own=False)
             source[rows] = np.where(source[rows] < 0, found, source[rows])
     return source
+
+
+def altered_copies(samples: Samples) -> IntArray:
+    """Find rows that repeat rows of an earlier test, but were resampled, averaged, shifted, rounded or made noisy.
+
+    They are recognised in the target that drifts most.
+
+    Returns
+    -------
+    ndarray of int of shape (n_rows,)
+        As of `repeats`.
+    """
+    source = np.full(len(samples), -1, dtype=np.intp)
+    target = int(np.nanargmax(np.nan_to_num(np.nanstd(samples.deviations, axis=0))))
+    for k in range(len(samples.test_names) - 1):
+        rows = np.flatnonzero(samples.test == k)
+        excerpts = take_excerpts(samples, target, samples.test == k, most=PER_TEST)
+        for later in range(k + 1, len(samples.test_names)):
+            _add_copies(source, excerpts, [(int(rows[0]), int(rows[-1]) + 1)], samples, target, later)
+    return source
+
+
+def _add_copies(
+    source: IntArray,
+    excerpts: Sequence[Excerpt],
+    learned: Sequence[tuple[int, int]],
+    samples: Samples,
+    target: int,
+    test: int,
+) -> None:
+    """Write into `source` the rows of a test that are altered copies, unless true copies in it are known."""
+    rows = np.flatnonzero(samples.test == test)
+    if excerpts and (source[rows] < 0).all():
+        source[rows] = find_excerpts(excerpts, learned, samples, target, rows)
 
 
 def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, own: bool) -> IntArray:
