@@ -102,8 +102,13 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
     if not any(run.rows for run in runs):
         return None
     steps = {name: float(scales[name].step) for name in names}
-    excerpts = take_excerpts(samples, target, learn) if thin else ()
-    return Prints(samples.interval(learn), _stretches(samples, learn), steps, tuple(runs), excerpts)
+    return Prints(
+        interval=samples.interval(learn),
+        learned=_stretches(samples, learn),
+        steps=steps,
+        runs=tuple(runs),
+        excerpts=take_excerpts(samples, target, learn) if thin else (),
+    )
 
 
 # -- runs ----------------------------------------------------------------------------------------------------------
