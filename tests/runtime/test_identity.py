@@ -48,22 +48,18 @@ def test_delivered_often_is_delivered_once(sent: Probing, error: float, rows: tu
 
 def test_one_id_or_one_time_is_one_probing_whatever_else_it_says() -> None:
     first, others = SENT[2], (SENT[0]._replace(deviation=8.5), SENT[1]._replace(deviation=8.6))
-    found = list(run({10: first, 30: others[0], 50: others[1], 70: Probing(8.7, 0.5, keys=("id 8", "time 61.0"))}))
+    found = list(run({10: first, 30: others[0], 50: others[1], 70: Probing(2.0, 0.5, keys=("id 8", "time 61.0"))}))
     assert [found[k][1] for k in (30, 50)] == [KNOWN] * 2
     assert not found[70][1]  # two that are two
 
 
-def test_two_that_are_two_but_not_apart_confirm_nothing() -> None:
-    """A chip on the sphere is there a minute later, too."""
-    each = {
-        10 + k: Probing(9.0 + 0.01 * k, 0.5, keys=(f"id {k}",)) for k in range(int(THRESHOLDS.probing_interval / 60.0))
-    }
+def test_a_chip_moves_nothing_however_often_it_is_probed() -> None:
+    """It is there a minute later, too, and after half an hour."""
+    times = [*range(10, 20), *range(40, 100, 30)]
+    each = {k: Probing(9.0 + 0.01 * k, 0.5, keys=(f"id {k}",)) for k in times}
     found = list(run(each, 100))
     assert all(found[k][1] for k in each)
     assert shift(found[-1][0]) == 0.0
-    state, why = list(run(each | {10 + len(each): Probing(9.2, 0.5, keys=("id x",))}, 100))[-1]
-    assert not why
-    assert shift(state) == pytest.approx(9.0, rel=0.1)
 
 
 def test_it_is_known_after_a_restart_and_a_new_zero(tmp_path: Path) -> None:
@@ -94,7 +90,7 @@ def test_what_no_model_could_use_may_come_again() -> None:
     bad, good = ({"t": float("nan"), "n": 0.0}, {"t": 20.0, "n": 0.0})
     for k, values in enumerate((good, bad, good)):
         state, said = running.step(state, Reading(60.0 * k, values), 60.0 * k, {"z": SENT[0]} if k else None)
-    assert "measure again" in said.refused["z"]
+    assert "are plausible: check the probe" in said.refused["z"]
     assert shift(state) == 0.0
 
 

@@ -148,12 +148,12 @@ class Thresholds:
         0.2, "", "share of the error on left-out cycles that neither offset nor directions explain", _PROBING
     )
     suspect: float = _fixed(
-        2.5, "standard deviations", "beyond this an unconfirmed probing counts less (Hampel's function)", _PROBING
+        2.5, "standard deviations", "beyond this a probing counts less (Hampel's function)", _PROBING
     )
     suspect_first: float = _fixed(
         2.0, "standard deviations", "the same for the first probing within `offset_decay`", _PROBING
     )
-    implausible: float = _fixed(4.0, "standard deviations", "beyond this an unconfirmed probing is refused", _PROBING)
+    implausible: float = _fixed(3.0, "standard deviations", "beyond this a probing is refused", _PROBING)
     least_usual: float = _fixed(
         0.5, "", "least typical error as a share of the overall RMS: most cycles have smaller errors", _PROBING
     )
@@ -161,16 +161,21 @@ class Thresholds:
         5.0, "probings", "number over which the size of the present day's errors is averaged", _PROBING
     )
     agreement: float = _fixed(
-        5.0, "standard deviations", "two probings that differ by no more confirm each other", _PROBING
+        5.0, "standard deviations", "two probings that differ by no more may be wrong in the same way", _PROBING
     )
     probing_interval: float = _fixed(
-        600.0, "s", "probings closer in time do not confirm each other: it may be the same chip", _PROBING
+        600.0, "s", "probings closer in time, with the same error, count once: it may be the same chip", _PROBING
     )
-    confirmed: float = _fixed(
-        3.0, "standard deviations", "a confirmed error counts as this many of the offset from then on", _PROBING
-    )
+    confirmed: float = _fixed(3.0, "", "not used any more; model files of earlier versions contain it", _PROBING)
     most_error: float = _fixed(
-        10.0, "", "largest error of a model as a multiple of that on left-out cycles (RMS); 8.2 was observed", _PROBING
+        5.0, "", "largest error of a model as a multiple of that on left-out cycles (RMS): three bands", _PROBING
+    )
+    most_probing: float = _fixed(
+        10.0, "um", "largest error of a model; a wrong probing is usually further off", _PROBING
+    )
+    most_usual: float = _fixed(2.0, "", "but at least this multiple of that on left-out cycles (RMS)", _PROBING)
+    most_moved: float = _fixed(
+        1.645, "", "largest change by probings as a multiple of that on left-out cycles (RMS): a band of 90 %", _PROBING
     )
     most_drift: float = _fixed(3.0, "", "largest error of a model as a multiple of the drift (RMS)", _PROBING)
     least_error: float = _fixed(1e-3, "um", "least error that is assumed", _OWN)

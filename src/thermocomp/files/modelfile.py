@@ -114,6 +114,9 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
         )
     entry = asdict(replace(model, watch=None))
     del entry["watch"], entry["thresholds"]  # stored once per file
+    prints = entry["provenance"] and entry["provenance"]["prints"]
+    if prints and not prints["excerpts"]:
+        del prints["excerpts"]  # as in a file from before there were any
     return entry
 
 

@@ -24,7 +24,7 @@ from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS, WatchState
 
-KIND = jsonfile.Format("thermocomp-state", 3, "state file", "thermocomp serve")
+KIND = jsonfile.Format("thermocomp-state", 4, "state file", "thermocomp serve")
 
 
 #: maximum magnitude of an error [um]
@@ -102,6 +102,7 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         )
     try:
         entry = _of_version_1(stored.state) if content.version == 1 else stored.state
+        entry = _of_version_3(entry) if content.version <= 3 else entry
         state = decode(CompensatorState, entry, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
@@ -128,6 +129,14 @@ def _of_version_1(entry: dict[str, Any]) -> dict[str, Any]:
         if name == "watches" and isinstance(old, list):
             found[name] = [_watch_of_version_1(watch, f"state.watches.{k}") for k, watch in enumerate(old)]
     return found
+
+
+def _of_version_3(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return a state without the spread of the offset, which is now its size."""
+    learned = entry.get("learned")
+    if not isinstance(learned, dict) or not all(isinstance(a, dict) for a in learned.values()):
+        return entry
+    return entry | {"learned": {t: {n: v for n, v in a.items() if n != "spread"} for t, a in learned.items()}}
 
 
 def _watch_of_version_1(entry: Any, place: str) -> Any:
@@ -220,7 +229,7 @@ def _check(state: CompensatorState, compensator: Compensator) -> None:
         sound = n >= 1 and np.linalg.eigvalsh(learned.covariance).min() >= -1e-6 * max(
             np.trace(learned.covariance), 1.0
         )
-        sizes = 0.0 < learned.size <= learned.spread <= _LARGEST
+        sizes = 0.0 < learned.size <= _LARGEST
         want(bool(sound) and sizes, None, place, "a mean with its covariance")
         want(
             learned.most > 0.0 and 0.0 < learned.usual <= 100.0,

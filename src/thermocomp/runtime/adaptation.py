@@ -6,10 +6,11 @@ differences. A probing measures the sum of these. The offset decays with a time 
 the present state of the machine; the coefficients represent what the training left undetermined and decay over days.
 Without a probing, the output of the model is unchanged.
 
-A probing can be wrong: a chip on the sphere, the wrong tool, another unit. A single probing moves a model by no more
-than `Thresholds.suspect` standard deviations of the expected error, and the less, the further beyond that it is; two
-probings that agree and are separated in time count in full; and no probing, however often repeated, moves a model
-beyond its largest possible error (`find_most`).
+A probing can be wrong: a chip on the sphere, the wrong tool, another unit, and it can be so again and again. One beyond
+`Thresholds.suspect` standard deviations of the expected error counts the less, the further beyond that it is; one that
+is implausible, or beyond the largest possible error of the model (`find_most`), is refused, however often it is
+repeated. Together, probings move a model by no more than its band (`Thresholds.most_moved`). A tool point that really
+moved further, with another fixture for example, needs an order: re-zero.
 """
 
 from typing import NamedTuple
@@ -46,18 +47,17 @@ class Adaptation(NamedTuple):
     mean: FloatArray  #: (n_directions + 1,)
     covariance: FloatArray  #: (n_directions + 1, n_directions + 1)
     size: float  #: root mean square of the error without probings [um]
-    spread: float  #: standard deviation of the offset without probings: the size, or more if observed [um]
     time: float  #: of the last probing that was used [s]
     refused: float = np.nan  #: error measured by the last probing, if not used in full [um]
     refused_since: float = -np.inf  #: time of the first probing with that error [s]
-    most: float = np.inf  #: maximum change of the model by probings [um]
+    most: float = np.inf  #: largest possible error of the model [um]
     usual: float = 1.0  #: variance of the errors on the present day, relative to that of the size
 
     def at(self, time: FloatArray | float, thresholds: Thresholds = THRESHOLDS) -> tuple[FloatArray, FloatArray]:
         """Return mean, (..., n), and covariance, (..., n, n), at later times [s], decaying to their prior values."""
         kept = self._kept(time, thresholds)
         prior = np.ones(len(self.mean))
-        prior[-1] = self.spread**2
+        prior[-1] = self.size**2
         covariance = kept[..., :, None] * self.covariance * kept[..., None, :]
         return kept * self.mean, covariance + np.eye(len(prior)) * ((1.0 - kept**2) * prior)[..., None, :]
 
@@ -79,7 +79,8 @@ class Adaptation(NamedTuple):
             [um]
         """
         found = (self._kept(time, thresholds) * self.mean * _beside(directions, 1.0)).sum(axis=-1)
-        return np.asarray(np.clip(found, -self.most, self.most))
+        most = min(self.most, thresholds.most_moved * self.size)
+        return np.asarray(np.clip(found, -most, most))
 
     def narrowing(
         self, time: FloatArray | float, directions: FloatArray, floor: float, thresholds: Thresholds = THRESHOLDS
@@ -112,8 +113,11 @@ def find_most(size: float, drift: float, magnitude: float, thresholds: Threshold
     magnitude : float
         Largest permitted correction [um].
     """
-    least = thresholds.least_error
-    return min(thresholds.most_error * max(size, least), thresholds.most_drift * max(drift, least), magnitude)
+    size = max(size, thresholds.least_error)
+    usual = max(thresholds.most_probing, thresholds.most_usual * size)
+    return min(
+        thresholds.most_error * size, usual, thresholds.most_drift * max(drift, thresholds.least_error), magnitude
+    )
 
 
 def begin(
@@ -138,7 +142,7 @@ def begin(
     prior = np.diag([*[1.0] * n_directions, size**2])
     usual = min(max(typical / size, thresholds.least_usual), 1.0) ** 2
     return Adaptation(
-        mean=np.zeros(n_directions + 1), covariance=prior, size=size, spread=size, time=-np.inf, most=most, usual=usual
+        mean=np.zeros(n_directions + 1), covariance=prior, size=size, time=-np.inf, most=most, usual=usual
     )
 
 
@@ -169,40 +173,39 @@ def take(
             f"{error} um with a repeatability of {repeatability} um: expected finite numbers, and a repeatability that "
             "is not negative",
         )
-    if abs(error) > before.most + thresholds.implausible * repeatability:
-        return before, (
-            f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
-            "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
-        )
-    (mean, covariance), spread = before.at(time, thresholds), before.spread
+    (mean, covariance) = before.at(time, thresholds)
     weights, own = _beside(directions, 1.0), (thresholds.unexplained * before.size) ** 2 + repeatability**2
     surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
+    if abs(error) > before.most + thresholds.implausible * repeatability:
+        grown = (error - surprise) * error > 0 and abs(surprise) <= thresholds.implausible * (known + own) ** 0.5
+        return before, (
+            f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
+            + ("it grew from probing to probing: ageing of the machine, or the probe; " if grown else "")
+            + "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
+        )
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
     alike = abs(error - before.refused) <= thresholds.agreement * (2 * own) ** 0.5
-    since = before.refused_since if alike else time
-    if alike and time - since < thresholds.probing_interval:  # possibly the same chip as before
-        return (
-            before,
-            "as implausible as the previous probing, and too soon to confirm it: measure again, at least "
-            f"{thresholds.probing_interval / 60:.0f} min after that one",
-        )
-    plausible = abs(surprise) <= thresholds.implausible * typical
     first = not time - before.time <= thresholds.offset_decay
     suspect = thresholds.suspect_first if first else thresholds.suspect
-    if alike and not plausible:  # confirmed
-        covariance[-1, -1] += surprise**2
-        spread = max(spread, abs(surprise) / thresholds.confirmed)
-    elif not alike and not plausible:
-        limit = f"at most {thresholds.implausible * typical:.1f} um are plausible"
-        wait = f"measure again after {thresholds.probing_interval / 60:.0f} min"
-        why = f"{surprise:+.1f} um from the expected value, where {limit}: {wait}"
-        return before._replace(refused=error, refused_since=since), why
-    elif not alike and abs(surprise) > suspect * typical:  # possibly a bad probing
+    if abs(surprise) > thresholds.implausible * typical:
+        why = (
+            f"{surprise:+.1f} um from the expected value, where at most {thresholds.implausible * typical:.1f} um are "
+            "plausible: check the probe and the tool; if the tool point did move this far, re-zero the target"
+        )
+        return before._replace(refused=error, refused_since=time), why
+    if alike and (
+        time - before.refused_since < thresholds.probing_interval or abs(surprise) > suspect * typical
+    ):  # possibly the same chip as before
+        return before._replace(refused_since=time), (
+            f"{surprise:+.1f} um from the expected value, as the previous probing: it counts only once; check the "
+            "probe and the tool"
+        )
+    if abs(surprise) > suspect * typical:  # possibly a bad probing
         far = abs(surprise) / typical
         weight = (suspect / far) ** 2
         if first:
             weight *= max(thresholds.implausible - far, 1e-6) / (thresholds.implausible - suspect)
-        noise, doubt = own + (known + own) * (1.0 / weight - 1.0), (error, since)
+        noise, doubt = own + (known + own) * (1.0 / weight - 1.0), (error, time)
     seen = min(surprise**2 / (known + own), thresholds.suspect**2)
     usual = before.usual + (seen - before.usual) / thresholds.probings_averaged
     usual = max(usual, thresholds.least_usual**2)
@@ -214,7 +217,6 @@ def take(
     return before._replace(
         mean=mean,
         covariance=(after + after.T) / 2,
-        spread=spread,
         time=time,
         refused=refused,
         refused_since=refused_since,
