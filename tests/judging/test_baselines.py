@@ -21,6 +21,7 @@ from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import COLD, Start
+from thermocomp.report.summary import verdict
 
 FloatArray = NDArray[np.float64]
 Policy = Literal["clip", "hold", "fade"]
@@ -151,6 +152,7 @@ def test_a_model_accepted_for_a_duty_fades_outside_it() -> None:
         assert "other speeds and durations are not proved" in model.honest_error.why
         assert model.accepted
         assert model.support == Support(expected, 0.1)
+        assert verdict(found.comparison).endswith("; for this duty only (z_um): the drift was much the same each time.")
 
 
 def test_an_output_that_overshoots_agrees_and_is_worse_all_the_same() -> None:

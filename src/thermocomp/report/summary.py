@@ -73,6 +73,9 @@ def verdict(comparison: Comparison) -> str:
     who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
     with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
     text = f"Use {who}: on unseen data, the RMS falls from {_span(without)} to {_span(with_)} um"
+    limited = [t for t, a in usable.items() if a.word == "accepted for this duty"]
+    if limited:
+        text += f"; for this duty only ({_list(limited)}): the drift was much the same each time"
     if left:
         text += f"; no model passed for {_list(left)}"
     return text + "."
