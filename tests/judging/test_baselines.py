@@ -110,7 +110,7 @@ def test_slow_changes_of_a_recording_make_no_difference(seed: int, n: int, first
     rng = np.random.default_rng(seed)
     drift, output = 10.0 * rng.normal(size=(2, 40 * n))
     u = np.linspace(0, 1, 40 * n)
-    slow = first * u + second * np.cos(np.pi * rng.integers(1, n + 1) * u)
+    slow = first * u + second * np.cos(np.pi * rng.integers(1, 2 * n + 1) * u)
     one, other = (cycles(drift + c * slow, output + c * slow, n).compared[SLOW] for c in (0.0, 1.0))
     np.testing.assert_allclose(np.array(one), np.array(other), atol=1e-6)
 

@@ -47,6 +47,14 @@ def test_other_drifts_are_other_observations() -> None:
     assert group_repeats([series(np.zeros(1)), series(np.zeros(30))]) == [[0], [1]]
 
 
+def test_alike_in_part_is_not_the_same() -> None:
+    details, ramp = wander(1, 100), np.linspace(0.0, 40.0, 100)
+    assert group_repeats([series(details), series(details + ramp)]) == [[0], [1]]
+    slow = 60.0 * (1 - np.exp(-np.arange(100) / 30.0))
+    assert group_repeats([series(slow + 0.2 * wander(k, 100)) for k in (1, 2)]) == [[0], [1]]
+    assert group_repeats([series(slow + 0.2 * details)] * 2) == [[0, 1]]
+
+
 def verdict(of: list[int], left: list[float]) -> Verdict:
     """Return the verdict over copies of drifts, with the share that the model leaves of each."""
     units = []

@@ -129,6 +129,35 @@ def test_of_a_copy_between_new_rows_the_copy_is_found(disguise: Callable[[Record
     assert np.abs(found[rows] - there).max() <= 2.0
 
 
+def test_a_piece_of_a_copy_ends_where_it_ends() -> None:
+    one, new = small_machine(), small_machine((2200.0, 1200.0, 1700.0, 2600.0), seed=5)
+    piece, rest = columns(noisy(one)), columns(new)
+    joined = {n: np.concatenate([piece[n][:400], rest[n][400:]]) for n in piece}
+    assert 0.4 < copied(one, with_rows(one, one.time, joined), "z_um") < 0.5 + 120 / 800
+
+
+@pytest.mark.parametrize("shift", [0.25, 0.5, 0.75])
+def test_a_short_copy_between_its_rows(shift: float) -> None:
+    day = small_machine()
+    short = with_rows(day, day.time[:80], {n: x[:80] for n, x in columns(day).items()})
+    assert copied(short, interpolated(short, short.time[:-1] + 60.0 * shift), "z_um") > 0.9
+
+
+def test_means_over_many_rows_are_a_copy() -> None:
+    day = small_machine(dt=20.0)
+    n = len(day) // 6 * 6
+    means = {k: x[:n].reshape(-1, 6).mean(axis=1) for k, x in columns(day).items()}
+    assert copied(day, with_rows(day, day.time[:n].reshape(-1, 6).mean(axis=1), means), "z_um") > 0.9
+
+
+def test_copies_are_found_in_the_target_that_drifts() -> None:
+    days = [small_machine(), small_machine((2200.0, 1200.0, 1700.0, 2600.0), seed=5)]
+    days = [replace(d, table=d.table.assign(x_um=1e-3 * d.table["x_um"])) for d in days]
+    samples = stack([*days, replace(noisy(days[0]), name="again")], ["x_um", "z_um"])
+    with pytest.raises(InputError, match="again#3"):
+        refuse_leaks(samples, splits.leave_one_file_out(samples))
+
+
 @pytest.mark.parametrize("disguise", DISGUISES)
 def test_a_disguised_copy_is_not_judged_by_its_original(disguise: Callable[[Recording], Recording]) -> None:
     days = [small_machine(), small_machine((2200.0, 1200.0, 1700.0, 2600.0), seed=5)]
@@ -154,6 +183,11 @@ def test_the_same_drift_with_other_temperatures_is_no_copy() -> None:
     assert copied(one, other, "z_um") == 0.0
     same = {**columns(other), "z_um": columns(one)["z_um"]}
     assert copied(one, with_rows(other, other.time, same), "z_um") == 0.0
+    first, second = (
+        with_rows(r, r.time, {n: table[n] for n in ("t1_C", "spindle_rpm", "z_um")})
+        for r, table in ((one, columns(one)), (other, same))
+    )
+    assert copied(first, second, "z_um") == 0.0
 
 
 def test_without_noise_or_movement_there_is_nothing_to_know_again() -> None:

@@ -125,6 +125,21 @@ def test_in_the_same_chip_ten_are_one() -> None:
         assert found.shift(0.5 * HOUR * k, NOTHING) <= 1.645 * 2.0
 
 
+def test_what_is_suspect_again_half_an_hour_later_counts_only_once() -> None:
+    once, why = adaptation.take(adaptation.begin(2.0, 0, 0.8), NOTHING, 60.0, 2.8, 0.0)
+    assert not why
+    found, why = adaptation.take(once, NOTHING, 0.5 * HOUR, 4.4, 0.0)
+    assert "as the previous probing: it counts only once" in why
+    assert (found.mean == once.mean).all()
+
+
+def test_what_was_refused_is_not_taken_a_minute_later_for_being_a_little_less() -> None:
+    before, why = adaptation.take(adaptation.begin(2.0, 0), NOTHING, 60.0, 6.3, 0.0)
+    assert "are plausible" in why
+    _, why = adaptation.take(before, NOTHING, 120.0, 5.0, 0.0)
+    assert "as the previous probing: it counts only once" in why
+
+
 def test_on_a_day_of_small_errors_less_is_plausible() -> None:
     def limit(errors: list[float]) -> float:
         found, time = adaptation.begin(2.0, 0), 0.0

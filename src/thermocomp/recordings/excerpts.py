@@ -143,8 +143,10 @@ def find_excerpts(
         # excerpts of one section that are shifted by the same time
         mine = [p for p in places if abs(_shift(p) - _shift(lead)) < max(p.excerpt.interval, table.interval)]
         places = [p for p in places if p not in mine]
-        if not _copied(mine, table):
+        mine = _copied(list({p.excerpt.row: p for p in mine}.values()), table)
+        if not mine:
             continue
+        lead = mine[0]
         there = lead.excerpt.row + (samples.time[rows] - lead.begin) / lead.excerpt.interval
         known = {p.excerpt.row for p in mine}
         for a, b in ((a, b) for a, b in learned if a <= lead.excerpt.row < b):
@@ -214,23 +216,22 @@ def _at(
     return (np.interp(at + half, own, total) - np.interp(at - half, own, total)) / table.interval, y[inside]
 
 
-def _copied(places: Sequence[_Place], table: _Table) -> bool:
-    """Return whether the noise of excerpts is found again, at one shift in time that they share."""
+def _copied(places: Sequence[_Place], table: _Table) -> list[_Place]:
+    """Return the places at which the noise of the excerpts is found again, at one shift in time that they share."""
     shortest = min(table.interval, *(p.excerpt.interval for p in places))
     offsets = shortest * np.arange(-4, 5) / 4
     middle = float(np.median([_shift(p) for p in places]))
     longer = table.interval > 1.5 * places[0].excerpt.interval
+    best, most = list[tuple[_Place, FloatArray, FloatArray]](), CERTAIN
     for averaged in (False, True) if longer else (False,):
         for offset in offsets:
-            found = [_signs(p, middle + offset, table, averaged=averaged) for p in places]
-            target, inputs = (np.concatenate(signs) for signs in zip(*found, strict=True))
-            every = np.concatenate([target, inputs])
-            if not every.size or every.mean() < LEAST_SHARE or _surely(every) < CERTAIN:
-                continue
-            # the target alone may be the same on two days
-            if not any(len(p.values) > 1 for p in places) or _surely(inputs) > CERTAIN_INPUTS:
-                return True
-    return False
+            found = [(p, *_signs(p, middle + offset, table, averaged=averaged)) for p in places]
+            found = [(p, t, i) for p, t, i in found if _share([t, i]) >= LEAST_SHARE]
+            if found and (surely := _surely([x for _, *both in found for x in both])) > most:
+                best, most = found, surely
+    # the target alone may be the same on two days
+    known = not any(len(p.values) > 1 for p, *_ in best) or _surely([i for *_, i in best]) > CERTAIN_INPUTS
+    return [p for p, *_ in best if known]
 
 
 def _signs(place: _Place, shift: float, table: _Table, *, averaged: bool) -> tuple[FloatArray, FloatArray]:
@@ -243,6 +244,11 @@ def _signs(place: _Place, shift: float, table: _Table, *, averaged: bool) -> tup
     return found[0], np.concatenate([np.empty(0), *found[1:]])
 
 
-def _surely(signs: FloatArray) -> float:
+def _share(signs: Sequence[FloatArray]) -> float:
+    """Return the mean of signs."""
+    return float(np.concatenate(signs).sum() / max(sum(map(len, signs)), 1))
+
+
+def _surely(signs: Sequence[FloatArray]) -> float:
     """Return by how many standard deviations signs agree more often than by chance."""
-    return float(signs.sum() / np.sqrt(max(len(signs), 1)))
+    return float(np.concatenate(signs).sum() / np.sqrt(max(sum(map(len, signs)), 1)))

@@ -177,7 +177,7 @@ def take(
     weights, own = _beside(directions, 1.0), (thresholds.unexplained * before.size) ** 2 + repeatability**2
     surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
     if abs(error) > before.most + thresholds.implausible * repeatability:
-        grown = (error - surprise) * error > 0 and abs(surprise) <= thresholds.implausible * (known + own) ** 0.5
+        grown = abs(surprise) <= thresholds.implausible * (known + own) ** 0.5
         return before, (
             f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
             + ("it grew from probing to probing: ageing of the machine, or the probe; " if grown else "")
