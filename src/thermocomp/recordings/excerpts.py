@@ -61,10 +61,12 @@ def take_excerpts(samples: Samples, target: int, learn: BoolArray, most: int = E
     found = list[tuple[float, Excerpt]]()
     for k in np.unique(samples.test[learn]):
         rows = np.flatnonzero(learn & (samples.test == k) & np.isfinite(samples.deviations[:, target]))
+        size = min(ROWS, len(rows))
+        if size < LEAST_ROWS:
+            continue
         table = _table(samples, target, rows)
         names = _noisiest(table)
-        size = min(ROWS, len(rows))
-        if size < LEAST_ROWS or samples.targets[target].name not in names:
+        if not names:
             continue
         for a in range(0, len(rows) - size + 1, size):
             part = slice(a, a + size)

@@ -74,7 +74,7 @@ def altered_copies(samples: Samples) -> IntArray:
         As of `repeats`.
     """
     source = np.full(len(samples), -1, dtype=np.intp)
-    target = int(np.nanargmax(np.nan_to_num(np.nanstd(samples.deviations, axis=0))))
+    target = int(np.argmax([np.ptp(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in samples.deviations.T]))
     for k in range(len(samples.test_names) - 1):
         rows = np.flatnonzero(samples.test == k)
         excerpts = take_excerpts(samples, target, samples.test == k, most=PER_TEST)
