@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from smallmachine import small_machine
 
-from thermocomp.core.exceptions import InputError
-from thermocomp.core.fingerprints import pack_values, unpack_values
+from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.fingerprints import Excerpt, pack_values, unpack_values
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.leaks import refuse_leaks
@@ -212,3 +212,17 @@ def test_excerpts_are_small(models: tuple[ErrorModel, ...]) -> None:
     assert models[0].provenance is not None
     assert models[0].provenance.prints is not None
     assert sum(len(t) for e in models[0].provenance.prints.excerpts for t in e.values.values()) < 9_000
+
+
+@pytest.mark.parametrize("step", ["nan", "inf", "0", "-1", "", "x"])
+def test_a_damaged_excerpt_is_refused(step: str) -> None:
+    packed = pack_values(np.arange(9.0), 0.5).split()[1]
+    assert Excerpt(0, 60.0, {"z_um": f"0.5 {packed}"})
+    for text in (f"{step} {packed}", "0.5 ?", "0.5 " + packed[:8]):
+        if text != f"0.5 {packed}":
+            with pytest.raises(SettingError, match="excerpt"):
+                Excerpt(0, 60.0, {"z_um": text, "t1_C": f"0.5 {packed}"})
+    with pytest.raises(SettingError, match="there are no values"):
+        Excerpt(0, 60.0, {})
+    with pytest.raises(SettingError, match="must not be negative or zero"):
+        Excerpt(0, float("nan"), {"z_um": f"0.5 {packed}"})

@@ -41,7 +41,7 @@ MODEL = PacedDynamic(
 
 
 def test_it_is_a_kalman_filter() -> None:
-    free = replace(THRESHOLDS, suspect=1e5, suspect_first=1e5, implausible=1e6)
+    free = replace(THRESHOLDS, suspect=1e5, suspect_first=1e5, implausible=1e6, most_moved=1e6)
     rng = np.random.default_rng(0)
     kinds, prior = np.array([7 * 86400.0, 7 * 86400.0, 4 * HOUR]), np.diag([1.0, 1.0, 4.0])
     mean, covariance, last = np.zeros(3), prior.copy(), 0.0
@@ -51,7 +51,7 @@ def test_it_is_a_kalman_filter() -> None:
         mean, covariance = fading @ mean, fading @ covariance @ fading + prior - fading @ prior @ fading
         directions, error = rng.normal(0.0, 1.0, 2), float(rng.normal(0.0, 2.0))
         h = np.append(directions, 1.0)
-        assert found.shift(time, directions) == pytest.approx(h @ mean)
+        assert found.shift(time, directions, free) == pytest.approx(h @ mean)
         assert found.narrowing(time, directions, 2.0) == pytest.approx(
             math.sqrt(h @ covariance @ h / (h @ prior @ h)), rel=1e-9
         )
@@ -85,7 +85,7 @@ def test_what_is_implausible_is_refused_however_often() -> None:
     found = adaptation.begin(2.0, 1)
     for k in range(1, 50):
         found, why = adaptation.take(found, np.ones(1), 0.5 * HOUR * k, 9.0 + 0.01 * k, 0.1)
-        assert "um from the expected value, where at most 6.8 um are plausible: check the probe and the tool" in why
+        assert "um from the expected value, where at most 6.8 um are plausible: check the probe, the tool" in why
         assert why.endswith("re-zero the target")
         assert found.shift(0.5 * HOUR * k, np.ones(1)) == 0.0
     found, why = adaptation.take(found, np.ones(1), 30 * HOUR, 2.0, 0.1)  # a sound one counts
@@ -167,6 +167,19 @@ def test_a_creeping_error_is_followed_to_the_band_and_then_reported(step: float)
         assert abs(found.shift(k * HOUR, 20.0 * directions)) <= 1.645 * 1.5 + 1e-9  # nor later, on a hotter machine
     assert "whose error can be at most 7.5 um: it grew from probing to probing: ageing of the machine, or" in told[0]
     assert "re-zero the target" in told[0]
+
+
+def test_after_a_creeping_error_a_sound_probing_counts_at_once() -> None:
+    """What is expected is what is corrected, not what the probings would have moved it to without a limit."""
+    found, time = adaptation.begin(1.5, 0, most=7.5), 0.0
+    for k in range(1, 8):
+        time = k * HOUR
+        found, _ = adaptation.take(found, NOTHING, time, 0.9 * k, 0.0)
+        assert found.mean[-1] == pytest.approx(found.shift(time, NOTHING))
+    assert found.shift(time, NOTHING) == pytest.approx(1.645 * 1.5)
+    found, why = adaptation.take(found, NOTHING, time + 0.5 * HOUR, 0.2, 0.0)
+    assert not why
+    assert abs(found.shift(time + 0.5 * HOUR, NOTHING) - 0.2) < 0.3
 
 
 def test_a_step_is_not_called_ageing() -> None:

@@ -49,7 +49,9 @@ def unpack_values(text: str) -> FloatArray:
     step, _, packed = text.partition(" ")
     try:
         content = zlib.decompressobj().decompress(base64.b64decode(packed.encode("ascii"), validate=True), MOST_BYTES)
-        return np.cumsum(np.frombuffer(content, dtype="<i2"), dtype=np.float64) * float(step)
+        if not 0.0 < (size := float(step)) < np.inf:
+            raise SettingError(f"excerpt {text[:12]!r}...: step {step[:12]}: must be positive and finite")
+        return np.cumsum(np.frombuffer(content, dtype="<i2"), dtype=np.float64) * size
     except (ValueError, zlib.error) as e:
         raise SettingError(f"excerpt {text[:12]!r}...: not a step and compressed values: {e}") from e
 

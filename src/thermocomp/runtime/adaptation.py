@@ -79,8 +79,12 @@ class Adaptation(NamedTuple):
             [um]
         """
         found = (self._kept(time, thresholds) * self.mean * _beside(directions, 1.0)).sum(axis=-1)
-        most = min(self.most, thresholds.most_moved * self.size)
+        most = self.reach(thresholds)
         return np.asarray(np.clip(found, -most, most))
+
+    def reach(self, thresholds: Thresholds = THRESHOLDS) -> float:
+        """Return the largest change of the model by probings [um]."""
+        return min(self.most, thresholds.most_moved * self.size)
 
     def narrowing(
         self, time: FloatArray | float, directions: FloatArray, floor: float, thresholds: Thresholds = THRESHOLDS
@@ -173,15 +177,17 @@ def take(
             f"{error} um with a repeatability of {repeatability} um: expected finite numbers, and a repeatability that "
             "is not negative",
         )
-    (mean, covariance) = before.at(time, thresholds)
+    mean, covariance = before.at(time, thresholds)
     weights, own = _beside(directions, 1.0), (thresholds.unexplained * before.size) ** 2 + repeatability**2
-    surprise, known = error - float(weights @ mean), float(weights @ covariance @ weights)
+    expected, known, reach = float(weights @ mean), float(weights @ covariance @ weights), before.reach(thresholds)
+    surprise = error - expected
+    check = "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
+    if expected * error > 0 and abs(expected) > 0.5 * reach:
+        check = f"it grew from probing to probing: ageing of the machine, or the probe; {check}"
     if abs(error) > before.most + thresholds.implausible * repeatability:
-        grown = abs(surprise) <= thresholds.implausible * (known + own) ** 0.5
         return before, (
             f"{error:+.1f} um from the prediction of the model, whose error can be at most {before.most:.1f} um: "
-            + ("it grew from probing to probing: ageing of the machine, or the probe; " if grown else "")
-            + "check the probe, the tool and the unit (um); if the tool point did move this far, re-zero the target"
+            f"{check}"
         )
     typical, noise, doubt = (known * before.usual + own) ** 0.5, own, (np.nan, -np.inf)
     alike = abs(error - before.refused) <= thresholds.agreement * (2 * own) ** 0.5
@@ -190,7 +196,7 @@ def take(
     if abs(surprise) > thresholds.implausible * typical:
         why = (
             f"{surprise:+.1f} um from the expected value, where at most {thresholds.implausible * typical:.1f} um are "
-            "plausible: check the probe and the tool; if the tool point did move this far, re-zero the target"
+            f"plausible: {check}"
         )
         return before._replace(refused=error, refused_since=time), why
     if alike and (
@@ -213,6 +219,7 @@ def take(
     variance = float(weights @ gain) + noise
     after = covariance - np.outer(gain, gain) / variance
     mean = mean + gain * (surprise / variance)
+    mean = mean * min(1.0, reach / max(abs(float(weights @ mean)), 1e-12))  # what is expected is what is corrected
     refused, refused_since = doubt
     return before._replace(
         mean=mean,
