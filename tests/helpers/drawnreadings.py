@@ -253,11 +253,12 @@ def _wrong_speed(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> Non
 
 
 def _no_start(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:
-    """Read at the start what no machine has that starts: all far from the training, or one from the others."""
+    """Read at the start what a machine rarely has: all far from the training, or half of them or one off the others."""
     heat, rows = _heat(channels), slice(0, int(rng.integers(1, 30)))
     one = int(rng.choice(heat))
-    span = max(channels[one].high - channels[one].low, 10.0)
-    values[rows, heat if rng.random() < 0.4 else [one]] += rng.choice([-25.0, 16.0, 40.0, 200.0, -1.5 * span])
+    span, share = max(channels[one].high - channels[one].low, 42.0), rng.random()
+    some = heat if share < 0.4 else heat[: len(heat) // 2] if share < 0.5 else [one]
+    values[rows, some] += rng.choice([-25.0, 16.0, 40.0, 200.0, -1.5 * span])
 
 
 def _outlier_at_the_start(rng: Rng, values: FloatArray, channels: Sequence[Input]) -> None:

@@ -15,6 +15,7 @@ from driftmodels import ACCEPTED, growing
 
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.exceptions import InputError, ThermocompError
+from thermocomp.core.inputs import Input
 from thermocomp.core.ports import LinkStatus
 from thermocomp.core.reading import Measurement, Reading
 from thermocomp.live import inforce, statefile
@@ -249,6 +250,18 @@ def test_without_a_reading_it_holds_and_says_so() -> None:
 
     asyncio.run(running(service, work))
     assert any("no reading for" in e.text for e in service.events)
+
+
+def test_a_sensor_that_is_off_the_others_at_the_start_is_reported_once() -> None:
+    inputs = tuple(Input(f"t{k}", "temperature", "degC", 20.0, True, -1.0, 5.0) for k in range(3))
+    model = replace(growing("z_um", 2.0), inputs=inputs)
+    service = Service(Compensator.of([model], QUICK), [], [])
+    for k in range(3):
+        service.take(Reading(time.time(), {"t0": 20.0 + k, "t1": 50.9 + k, "t2": 20.0 + k}))
+        time.sleep(0.01)
+    assert service.counts == {"readings": 3, "rejected": 0}
+    (told,) = [e for e in service.events if e.kind == "sensor"]
+    assert told.text.startswith("compared with the training, these start off the other temperatures: t1 +30.9 degC: ")
 
 
 def test_what_is_ordered_is_in_the_events() -> None:

@@ -54,11 +54,22 @@ def test_a_step_of_a_probe_caps_the_verdict_on_it_alone() -> None:
 
 
 def test_trouble_of_a_sensor_caps_the_verdict_on_all_that_use_it() -> None:
-    recording = spoiled("t2_C", slice(430, None), 6.0)
+    recording = spoiled("t2_C", slice(None), 273.15)
     samples = drop_unsound(stack([recording], ["z_um", "x_um"]), [recording])
     assert {channel for channel, _ in samples.trouble} == {"t2_C"}
     result = compare(samples, ["dynamic"], splits.leave_one_cycle_out(samples), robustness=False)
     assert all(a.word != "accepted" for a in result.overall())
+
+
+def test_a_temperature_is_left_out_from_its_step_on() -> None:
+    recording = spoiled("t2_C", slice(430, None), 6.0)
+    whole = stack([recording], ["z_um"])
+    samples = drop_unsound(whole, [recording])
+    assert not samples.trouble
+    column = [c.name for c in samples.inputs].index("t2_C")
+    assert np.flatnonzero(np.isnan(samples.values[:, column])).tolist() == list(range(430, len(samples)))
+    left, right = np.delete(samples.values, column, axis=1), np.delete(whole.values, column, axis=1)
+    np.testing.assert_array_equal(left, right)
 
 
 def test_assess_leaves_trouble_out_too() -> None:

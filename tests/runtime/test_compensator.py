@@ -15,9 +15,11 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
+from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import limit_offset
+from thermocomp.runtime.starting import describe_start, find_offsets
 from thermocomp.runtime.state import Compensated, CompensatorState
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9, hold=1e12)
@@ -226,18 +228,37 @@ def three_sensors(quantity: str = "temperature", unit: str = "degC") -> LinearDy
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("off", [-24.9, -12.0, 12.0, 24.9])
-def test_one_sensor_that_is_off_at_the_start_is_no_zero(off: float) -> None:
-    """It would have been the zero: the machine compensated from 25 degC beside it for the rest of the day."""
+@pytest.mark.parametrize("off", [-39.9, -12.0, 12.0, 39.9])
+def test_one_sensor_that_is_off_at_the_start_counts_by_its_rises(off: float) -> None:
+    """Every later start was refused, though a constant offset does a rise no harm."""
     models = [three_sensors("dimensionless", "1")]
-    begin = {"t0": 14.0, "t1": 15.2, "t2": 16.1 + off, "q": 1.0}
+    begin = {"t0": 14.0, "t1": 15.0, "t2": 16.0 + off, "q": 1.0}  # 6 degC colder than in the training
     state, result = step(models, OPEN, start(models), Reading(0.0, begin), 0.0)
-    assert result.rejected.startswith(f"t2 = {16.1 + off:g} degC is not plausible as a start")
-    assert math.isnan(state.models[0].reference[2])
-    good = begin | {"t2": 16.1}  # a workshop 6 degC colder than that of the training is one
-    state, result = step(models, OPEN, state, Reading(1.0, good), 1.0)
     assert not result.rejected
-    assert state.models[0].reference.tolist() == [14.0, 15.2, 16.1, 0.0]
+    assert state.models[0].reference.tolist() == [14.0, 15.0, 16.0 + off, 0.0]
+    warm = {"t0": 15.0, "t1": 15.0, "t2": 18.0 + off, "q": 1.0}
+    _, result = step(models, OPEN, state, Reading(60.0, warm), 60.0)
+    assert result.deviations["z"].offset == pytest.approx(1.0 + 2.0 + 1.0)
+    said = describe_start(models, state.models)
+    assert said.startswith(f"compared with the training, these start off the other temperatures: t2 {off:+.1f} degC: ")
+
+
+@pytest.mark.parametrize("off", [43.0, 49.6])
+def test_a_sensor_in_another_unit_is_no_zero(off: float) -> None:
+    models = [three_sensors("dimensionless", "1")]
+    begin = {"t0": 20.0, "t1": 21.0, "t2": 22.0 + off, "q": 1.0}
+    state, result = step(models, OPEN, start(models), Reading(0.0, begin), 0.0)
+    assert result.rejected.startswith(f"t2 = {22.0 + off:g} degC is not plausible as a start")
+    assert math.isnan(state.models[0].reference[2])
+    _, result = step(models, OPEN, state, Reading(1.0, begin | {"t2": 22.0}), 1.0)
+    assert not result.rejected
+
+
+@pytest.mark.parametrize("off", [-40.0, 40.0])
+def test_half_of_the_sensors_may_be_off_together(off: float) -> None:
+    inputs = [Input(f"t{k}", "temperature", "degC", 20.0 + k, True, -1.0, 4.0) for k in range(4)]
+    zero = [20.0, 21.0 + off, 22.0 + off, 23.0]
+    assert find_offsets(inputs, zero, THRESHOLDS) == {"t1": off, "t2": off}
 
 
 def test_a_machine_far_from_all_that_was_trained_does_not_start() -> None:

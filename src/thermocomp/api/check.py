@@ -11,7 +11,8 @@ from thermocomp.api.base import Paged, Result
 from thermocomp.api.inputs import Given, recordings_of
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.checks import quality
-from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.checks.findings import SEVERITIES, Finding
+from thermocomp.recordings.checks.offsets import compare_starts
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.recording import Recording
 
@@ -109,4 +110,5 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
     (2, False)
     """
     tests = recordings_of(recordings, mapping)
-    return CheckedRecordings(tuple(tests), tuple(quality.check(test) for test in tests))
+    found = ((*quality.check(test), *off) for test, off in zip(tests, compare_starts(tests), strict=True))
+    return CheckedRecordings(tuple(tests), tuple(sorted(f, key=lambda f: SEVERITIES.index(f.severity)) for f in found))

@@ -14,6 +14,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.zero import Zeroing
 from thermocomp.judging import splits
 from thermocomp.judging.splits import Judging
+from thermocomp.recordings.checks.offsets import compare_starts
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.readers import mapping as mappings
@@ -268,9 +269,9 @@ def trouble_of(recordings: Sequence[Recording]) -> list[str]:
     return [
         f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
         f"{'' if f.severity != 'trouble' or f.rows is None else '. These rows are left out'}"
-        for r in recordings
-        for f in check(r)
-        if f.severity == "trouble" or f.kind == "left out"
+        for r, off in zip(recordings, compare_starts(recordings), strict=True)
+        for f in (*check(r), *off)
+        if f.severity == "trouble" or f.kind in ("left out", "offset")
     ]
 
 

@@ -295,6 +295,7 @@ class Assessed(Result, Paged):
         return {
             "seen_in_training": judged.seen,
             "starts": starts_content(judged.starts),
+            "start_offsets_degC": judged.offsets,
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
             "trouble": self.trouble,

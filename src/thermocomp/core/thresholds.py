@@ -50,6 +50,15 @@ class Thresholds:
     zero_change: float = _fixed(
         15.0, "degC", "a zero that differs more from that of the training belongs to no known day", _START
     )
+    start_offset: float = _fixed(
+        42.0,
+        "degC",
+        "a temperature that is further off the others at the start is in another unit, as degF",
+        _START,
+    )
+    start_reported: float = _fixed(
+        0.8, "degC", "a temperature that is off the others at the start by more is reported", _START
+    )
     least_margin: float = _fixed(
         10.0, "degC", "margin outside the trained range of a temperature, if that range is smaller", _START
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start, find_starts
+from thermocomp.runtime.starting import find_offsets
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,9 @@ class Judged:
         Conditions covered by the thermal cycles of these recordings.
     starts : tuple of (str, Start)
         Names of the recordings, and their initial states.
+    offsets : dict of str to dict of str to float
+        By recording, then by temperature: those that start off the others; see
+        `thermocomp.runtime.starting.find_offsets` [degC].
     """
 
     models: tuple[ErrorModel, ...]
@@ -51,6 +55,7 @@ class Judged:
     seen: tuple[str, ...]
     validity: Validity | None = None
     starts: tuple[tuple[str, Start], ...] = ()
+    offsets: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return the assessments of the models over all cycles, one per model."""
@@ -97,6 +102,7 @@ def assess(
             absolute=are_absolute(models),
         )
     told: tuple[tuple[str, Start], ...] = ()
+    offsets: dict[str, dict[str, float]] = {}
     guards: list[Guard] = []
     errors: list[Exception] = []
     for model in models:
@@ -105,6 +111,8 @@ def assess(
             samples = drop_unsound(stack_for(model, recordings, starts), recordings)
             watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
             samples = _called_as_in(model, samples)
+            for name, zero in zip(samples.test_names, samples.reference().tolist(), strict=True):
+                offsets.setdefault(name, {}).update(find_offsets(model.inputs, zero, model.thresholds))
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
             samples, widening = believe(model, samples, every, watched)
             guard = _guard(model, samples, watched, guards)
@@ -121,7 +129,14 @@ def assess(
         found += [*cut, overall] if len(cut) > 1 else [overall]
     if len(errors) == len(models):
         raise errors[0]
-    return Judged(models=tuple(models), assessments=tuple(found), seen=seen, validity=covered, starts=told)
+    return Judged(
+        models=tuple(models),
+        assessments=tuple(found),
+        seen=seen,
+        validity=covered,
+        starts=told,
+        offsets={name: off for name, off in offsets.items() if off},
+    )
 
 
 def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:

@@ -26,6 +26,7 @@ from thermocomp.live.startvalues import WAITS, AtStart, StartValues
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
+from thermocomp.runtime.starting import describe_start
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
 from thermocomp.runtime.watch import UNSURE
 
@@ -129,12 +130,16 @@ class Service:
             )
             self._told_behind = tick
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
-        probings, learned = self.probings.take(), self.state.learned
+        probings, learned, started = self.probings.take(), self.state.learned, self.state.references.keys()
         self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
         self._heard = tick
         for target in [t for t, o in self.state.orders.items() if o == AVERAGED and t in self.state.raw]:
             self.state, self.keeper.no_zero = rezero(self.compensator, self.state, target, now, "new zero"), None
             self.say("reference", f"{target} has a new zero")
+        if self.state.references.keys() - started and (
+            off := describe_start(self.compensator.models, self.state.models)
+        ):
+            self.say("sensor", off)
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
         self._tell(said, probings)

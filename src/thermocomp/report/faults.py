@@ -18,6 +18,7 @@ from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, sv
 from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE
 from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
+from thermocomp.runtime.starting import describe_offsets
 
 #: colours by kind of failure
 TINTS = {
@@ -41,6 +42,7 @@ TITLE = "Sensors"
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
     """Return the section of the page about failed sensors."""
     logs = find_faults(judged, recordings)
+    begun: list[str | Layout | Shown] = [f"{name}: {describe_offsets(off)}." for name, off in judged.offsets.items()]
     if not logs:
         known = any(m.watch is not None for m in judged.models)
         why = (
@@ -48,13 +50,14 @@ def section(judged: Judged, recordings: Sequence[Recording]) -> Section:
             if known
             else "the model file contains no watch (fault detection); fit the model again"
         )
-        return Section(TITLE, [f"Temperature sensors were not monitored for faults: {why}."])
+        return Section(TITLE, [f"Temperature sensors were not monitored for faults: {why}.", *begun])
     if not any(log.faults for log in logs):
         watched = list(dict.fromkeys(name for log in logs for name in log.watch.failing))
-        return Section(TITLE, [f"None of the {len(watched)} sensors failed: {', '.join(watched)}."])
+        return Section(TITLE, [f"None of the {len(watched)} sensors failed: {', '.join(watched)}.", *begun])
     parts: list[str | Layout | Shown] = [
+        *begun,
         "The recordings were replayed as at the machine, where a fault takes effect until it is detected. Rows in "
-        "which thermocomp check finds a fault are excluded from the verdict above, but not from this section."
+        "which thermocomp check finds a fault are excluded from the verdict above, but not from this section.",
     ]
     for log in (log for log in logs if log.faults):
         recording = recordings[log.recording]

@@ -20,6 +20,7 @@ from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
+from thermocomp.runtime.starting import describe_offsets
 
 BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
@@ -87,6 +88,9 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     """Yield the lines and tables about models judged on recordings."""
     logs = find_faults(judged, recordings)
     yield from _starts(judged.starts)
+    yield from (
+        PrintedLine(f" {name}: {describe_offsets(off)}", BUT, whole=True) for name, off in judged.offsets.items()
+    )
     for line in describe_faults(logs, recordings):
         yield PrintedLine(f" {line}", Toned("sensor failed", "doubtful"), whole=True)
     yield from (PrintedLine(f" {line}", BUT, whole=True) for line in describe_held(judged, logs))

@@ -218,10 +218,10 @@ class Compensator:
 
         A temperature is plausible within its trained range widened on either side by the span of that range. For the
         first readings, which determine the zero, the median of the temperatures must lie within `zero_change` of the
-        zero of the training, and the offset of each temperature from the others may differ from that in the training by
-        at most its trained span or `least_margin`, whichever is greater. Quantities without physical bounds (a
-        displacement, a dimensionless number) may take values in their trained range widened by `margin` times its
-        width: see `thermocomp.core.thresholds.Thresholds`.
+        zero of the training, and each may differ from the others by at most its trained span or `start_offset`: only
+        rises from the zero are used. Quantities without physical bounds (a displacement, a dimensionless number) may
+        take values in their trained range widened by `margin` times its width: see
+        `thermocomp.core.thresholds.Thresholds`.
         """
         for group in self.groups:
             values = group.ranges.pick(reading.values)

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from operator import itemgetter
-from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
 from thermocomp.core.thresholds import Thresholds
+from thermocomp.runtime.starting import find_middle, find_start_span
 
 #: any finite number
 ANY = (-sys.float_info.max, sys.float_info.max)
@@ -49,12 +49,12 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
 
 def _no_start(offsets: Sequence[tuple[Input, float]], thresholds: Thresholds) -> str:
     """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
-    middle = median(offset for _, offset in offsets)
+    middle = find_middle([offset for _, offset in offsets])
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
         if abs(middle) > thresholds.zero_change:
             return f"{start}: the machine differs by {middle:+.1f} degC from the zero of the training data"
-        if abs(offset - middle) > max(channel.high - channel.low, thresholds.least_margin):
+        if abs(offset - middle) > find_start_span(channel, thresholds):
             apart = f"{offset - middle:+.1f} degC from the others"
             return f"{start}: relative to the zero of the training data, it differs by {apart}"
     return ""

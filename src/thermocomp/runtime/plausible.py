@@ -16,12 +16,16 @@ def replace_first(watch: Watch, values: FloatArray) -> FloatArray:
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
-    span = np.maximum(width, watch.thresholds.least_margin)
+    span = np.maximum(width, watch.thresholds.start_offset)
     least, most = watch.thresholds.plausible["temperature"]
     with np.errstate(all="ignore"):
         offset = np.where((values >= least) & (values <= most), values - zero, np.nan)
-        middle = np.maximum(np.isfinite(offset).sum(axis=-1, keepdims=True) - 1, 0) // 2
-        day = np.nan_to_num(np.take_along_axis(np.sort(offset, axis=-1), middle, axis=-1))  # nan is sorted last
+        count, ordered = np.isfinite(offset).sum(axis=-1, keepdims=True), np.sort(offset, axis=-1)  # nan is sorted last
+        below, above = (
+            np.nan_to_num(np.take_along_axis(ordered, middle, axis=-1))
+            for middle in (np.maximum(count - 1, 0) // 2, np.minimum(count // 2, np.maximum(count - 1, 0)))
+        )
+        day = np.where(np.abs(above) < np.abs(below), above, below)
         fits = np.abs(offset - day) <= span
     most_day = watch.thresholds.zero_change
     return np.where(fits, values, zero + np.clip(day, -most_day, most_day))

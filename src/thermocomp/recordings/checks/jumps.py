@@ -166,9 +166,11 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
         "or probe that was touched or came loose. Split the test there into two files, each with its own zero "
         "(reference reading), subtract the step from the values after it, or leave the channel out"
     )
-    times = sorted(float(time[mine.after[j]]) for j in lone)
+    begin, times = min(int(mine.after[j]) for j in lone), sorted(float(time[mine.after[j]]) for j in lone)
+    # of a temperature the values after it are left out; what a displacement was relative to before is not known either
+    rows = np.arange(begin, len(time)) if channel.quantity == "temperature" else None
     zeroed = [{"do": "rezero", "channels": [channel.name], "at": t, "reason": "step"} for t in times]
-    return Finding("trouble", channel.name, "step", text, row=row, remedy={"clean": zeroed})
+    return Finding("trouble", channel.name, "step", text, rows=rows, row=row, remedy={"clean": zeroed})
 
 
 def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) -> bool:

@@ -81,8 +81,9 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
     Returns
     -------
     dict of str to ndarray of bool of shape (n_rows,)
-        By channel name; only channels with such rows: spikes, error codes, implausible values, stuck values, and the
-        section between a step and its reversal. See `lasting_trouble` for other troubles.
+        By channel name; only channels with such rows: spikes, error codes, implausible values, stuck values, the
+        section between a step and its reversal, and a temperature from its step on. See `lasting_trouble` for other
+        troubles.
     """
     rows: dict[str, BoolArray] = {}
     for f in check(recording) if findings is None else findings:
@@ -92,7 +93,7 @@ def troubled_rows(recording: Recording, findings: Sequence[Finding] | None = Non
 
 
 def lasting_trouble(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return the troubles that concern a whole channel or recording: units, steps, swaps, clocks, dead sensors."""
+    """Return troubles of a whole channel or recording: units, swaps, clocks, dead sensors, steps of a probe."""
     return tuple(f for f in findings if f.severity == "trouble" and f.rows is None)
 
 

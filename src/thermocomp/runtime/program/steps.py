@@ -117,7 +117,9 @@ def check_start(s: Kept, w: Work, t: Constants, g: Whole) -> None:
             w.rows = w.rows + 1
     with when(w.rows > 0):
         sort(s, w, t)
-        w.middle = (w.column[(w.rows - 1) // 2] + w.column[w.rows // 2]) / 2.0
+        w.middle = w.column[(w.rows - 1) // 2]
+        with when(abs(w.column[w.rows // 2]) < abs(w.middle)):
+            w.middle = w.column[w.rows // 2]
         for m in each("m", t.set_begin[g], t.set_begin[g + 1]):
             r.set(t.set_range[m])
             with when(t.temperature[r] & t.rezero[r]):

@@ -86,6 +86,8 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
     with when(w.rows > 0):
         sort(s, w, t)
         w.middle = w.column[(w.rows - 1) // 2]
+        with when(abs(w.column[w.rows // 2]) < abs(w.middle)):
+            w.middle = w.column[w.rows // 2]
     for i in each("i", t.SENSORS):
         c.set(t.sensor_channel[i])
         fits = let("fits", w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature))

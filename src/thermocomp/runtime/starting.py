@@ -1,0 +1,60 @@
+"""First readings of a machine: which temperatures are off the others, compared with the start of the training."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from thermocomp.core.inputs import Input
+from thermocomp.core.model import ErrorModel
+from thermocomp.core.state import State
+from thermocomp.core.thresholds import Thresholds
+
+
+def find_middle(offsets: Sequence[float]) -> float:
+    """Return the median of offsets; of two middle ones that nearer to 0, so that half of them may be off together."""
+    if not offsets:
+        return 0.0
+    ordered = sorted(offsets)
+    return min(ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2], key=abs)
+
+
+def find_start_span(channel: Input, thresholds: Thresholds) -> float:
+    """Return how far a temperature may be off the others at the start [degC]."""
+    return max(channel.high - channel.low, thresholds.start_offset)
+
+
+def find_offsets(inputs: Sequence[Input], zero: Sequence[float], thresholds: Thresholds) -> dict[str, float]:
+    """Return the temperatures that start off the others, by more than `Thresholds.start_reported`.
+
+    Parameters
+    ----------
+    zero : sequence of float of shape (n_inputs,)
+        Zero of the inputs; nan while unknown.
+
+    Returns
+    -------
+    dict of str to float
+        Offset from the others, relative to the zero of the training [degC]. Only the rises from the zero are used, so
+        an offset does no harm.
+    """
+    own = {i.name: z - i.reference for i, z in zip(inputs, zero, strict=True) if i.rezero and math.isfinite(z)}
+    middle = find_middle(list(own.values()))
+    return {name: offset - middle for name, offset in own.items() if abs(offset - middle) > thresholds.start_reported}
+
+
+def describe_start(models: Sequence[ErrorModel], states: Sequence[State]) -> str:
+    """Return which temperatures of running models start off the others, as text; empty if none do."""
+    found = dict[str, float]()
+    for model, state in zip(models, states, strict=True):
+        found |= find_offsets(model.inputs, state.reference.tolist(), model.thresholds)
+    return describe_offsets(found)
+
+
+def describe_offsets(offsets: Mapping[str, float]) -> str:
+    """Return which temperatures start off the others, as text; empty if there are none."""
+    told = [f"{name} {offset:+.1f} degC" for name, offset in sorted(offsets.items(), key=lambda o: -abs(o[1]))]
+    return (
+        f"compared with the training, these start off the other temperatures: {', '.join(told)}: shifted sensors, or "
+        "a machine that had not cooled; only their rises from here on are used"
+        if told
+        else ""
+    )
