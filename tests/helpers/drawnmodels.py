@@ -34,6 +34,10 @@ OTHERS = {
 }
 
 
+#: usual numbers of temperatures, and so many that errors with two of them lost are predicted
+FEW, MANY = range(1, 6), range(8, 13)
+
+
 class Plant(NamedTuple):
     """The machine: temperatures follow the heat of its spindle and the room."""
 
@@ -55,7 +59,7 @@ class Drawn(NamedTuple):
 def draw_compensator(seed: int) -> Drawn:
     """Return a compensator; seeds in a row take turns at families, policies, watches and positions."""
     rng, zeroing = np.random.default_rng((1, seed)), ZEROINGS[seed % len(ZEROINGS)]
-    plant = draw_plant(rng)
+    plant = draw_plant(rng, MANY if seed % 10 == 6 else FEW)
     inputs = draw_inputs(rng, plant)
     thresholds = draw_thresholds(seed) if seed % 3 == 2 else THRESHOLDS
     watch = draw_watch(rng, plant, inputs, HEATER, zeroing) if seed % 4 else None
@@ -109,9 +113,9 @@ SUPPORTS = tuple(
 )
 
 
-def draw_plant(rng: Rng) -> Plant:
-    """Return a machine of one to five temperatures."""
-    n = int(rng.integers(1, 6))
+def draw_plant(rng: Rng, temperatures: range = FEW) -> Plant:
+    """Return a machine with a number of temperatures out of a range."""
+    n = int(rng.integers(temperatures.start, temperatures.stop))
     slow = float(rng.uniform(1800.0, 6000.0))
     return Plant(
         zero=20.0 + rng.uniform(-8.0, 8.0) + rng.uniform(-2.0, 2.0, n),

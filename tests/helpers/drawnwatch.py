@@ -106,5 +106,9 @@ def _mix(rng: Rng, room: FloatArray) -> FloatArray:
 def draw_lost(rng: Rng, model: ErrorModel, watch: Watch | None) -> dict[str, float]:
     """Return errors of a model without one, two or three of its sensors: some below what it may have, some not."""
     own = [] if watch is None else [i.name for i in model.inputs if i.name in watch.failing]
-    few = [c for count in (1, 2, 3) for c in combinations(own, count)]
-    return {", ".join(c): float(rng.choice([1.0, 4.0, 9.0], p=[0.6, 0.2, 0.2])) for c in few if rng.random() < 0.9}
+    judged = (
+        (1, 2, 3) if len(own) < 8 or rng.random() < 0.2 else (1,)
+    )  # otherwise the errors without several are predicted
+    shares = [0.6, 0.2, 0.2] if 2 in judged else [0.4, 0.5, 0.1]
+    few = [c for count in judged for c in combinations(own, count)]
+    return {", ".join(c): float(rng.choice([1.0, 4.0, 9.0], p=shares)) for c in few if rng.random() < 0.9}

@@ -15,11 +15,11 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.reading import Reading
+from thermocomp.core.starting import describe_start, find_offsets
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import limit_offset
-from thermocomp.runtime.starting import describe_start, find_offsets
 from thermocomp.runtime.state import Compensated, CompensatorState
 
 OPEN = Limits(magnitude=1e9, rate=1e9, reading_age=1e9, hold=1e12)

@@ -34,8 +34,8 @@ from thermocomp.runtime.watch import WORDS
 FloatArray = NDArray[np.float64]
 #: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults
 #: that the others do not: in the return of a sensor, in the rate of a fade, and in the exclusion of swaps; 27 and 31
-#: add speeds that are wrong or missing, and a swap
-SHORT, LONG = ((*range(1, 14), 27, 31, 34, 38, 42, 102, 129), 640), (range(1000, 1200), 5000)
+#: add speeds that are wrong or missing, and a swap; 46, 146 and 166 many temperatures, of which several fail
+SHORT, LONG = ((*range(1, 14), 27, 31, 34, 38, 42, 46, 102, 129, 146, 166), 640), (range(1000, 1200), 5000)
 #: of an ordinary run in structured text
 IN_TEXT = (range(1, 6), 200)
 #: smallest difference that counts [um]

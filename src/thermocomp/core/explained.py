@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from typing import Any
 
 from thermocomp.core.bounds import GAP
@@ -103,9 +104,11 @@ class Explanation:
         Behaviour outside its training range.
     covered : str
         Conditions covered by the judged cycles; empty if unknown.
+    judged_pairs : bool
+        Whether the errors with two sensors lost were judged; otherwise they are predicted.
     pairs : tuple of int
-        Number of sensor pairs whose simultaneous failure was tested, and number of these for which the correction
-        continues.
+        Number of sensor pairs whose simultaneous failure was tested, or with none tested of all pairs of temperatures,
+        and number of these for which the correction continues.
     thresholds : tuple of Threshold
         Fixed numbers by which the compensator decides.
     """
@@ -126,6 +129,7 @@ class Explanation:
     band: str
     outside: str
     covered: str
+    judged_pairs: bool
     pairs: tuple[int, int]
     thresholds: tuple[Threshold, ...]
 
@@ -176,7 +180,9 @@ def explain(model: ErrorModel) -> Explanation:
     known = {g.name: g for g in gains(model, _ANY)} if isinstance(model, PacedDynamic) else {}
     order = list(known) if known else [i.name for i in model.inputs]
     found = model.honest_error
-    several = [key for key in found.lost if key not in {i.name for i in model.inputs}] if found else []
+    judged = [k.split(", ") for k in found.lost if k not in {i.name for i in model.inputs}] if found else []
+    heat = [i.name for i in model.inputs if model.watch and i.name in model.watch.names and i.name in model.sensors]
+    pairs = judged or [list(pair) for pair in combinations(heat, 2)]
     return Explanation(
         target=model.target,
         unit=model.unit,
@@ -198,7 +204,8 @@ def explain(model: ErrorModel) -> Explanation:
         band=model.band.tell(model.unit) if model.band else "",
         outside=_outside(model),
         covered=_covered(model),
-        pairs=(len(several), sum(model.may_lose(names.split(", ")) for names in several)),
+        judged_pairs=bool(judged),
+        pairs=(len(pairs), sum(model.may_lose(pair) for pair in pairs)),
         thresholds=model.thresholds.rows,
     )
 
@@ -322,13 +329,8 @@ def _lines(e: Explanation) -> list[str]:
     lines += [f"  {_sensor_line(s, e.unit)}" for s in e.sensors]
     if e.pairs[0]:
         lines.append(
-            f"Two sensors lost at once: judged for {e.pairs[0]} pairs; the model continues without {e.pairs[1]} of "
-            "them."
-        )
-    elif len(watched) > 1:
-        lines.append(
-            "Two sensors lost at once: not judged, because there are too many pairs; the correction is held, "
-            "then fades."
+            f"Two sensors lost at once: {'judged' if e.judged_pairs else 'predicted from the errors above'} for "
+            f"{e.pairs[0]} pairs; the model continues without {e.pairs[1]} of them."
         )
     return lines
 

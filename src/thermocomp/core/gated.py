@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Input
 from thermocomp.core.provenance import HonestError, accepted
+from thermocomp.core.watch import Watch
 
 
 class Gated:
@@ -13,6 +14,7 @@ class Gated:
     target: str
     inputs: tuple[Input, ...]
     honest_error: HonestError | None
+    watch: Watch | None
 
     @property
     def accepted(self) -> bool:
@@ -21,7 +23,15 @@ class Gated:
 
     def may_lose(self, names: Collection[str]) -> bool:
         """Return whether the model without these inputs is better than no compensation: see `HonestError.may_lose`."""
-        return self.honest_error is not None and self.honest_error.may_lose(self._named(names))
+        return self.honest_error is not None and self.honest_error.may_lose(self._named(names), self.most_lost(names))
+
+    def most_lost(self, names: Collection[str]) -> int:
+        """Return the number of inputs without which the error may be predicted: a quarter of the watched temperatures.
+
+        A lost speed is not predicted together with other inputs, as it also changes the substitutes of temperatures.
+        """
+        speeds = any(i.quantity == "spindle_speed" for i in self.inputs if i.name in names)
+        return 1 if speeds or self.watch is None else len(self.watch.names) // 4
 
     def wrong_speeds(self, failed: Mapping[str, str]) -> list[str]:
         """Return the speeds among the inputs that were wrong before that was found: the states remember them.

@@ -58,6 +58,8 @@ class Provenance:
 #: version of the rules for verdicts; files without this number were judged by older rules
 RULES = 2
 
+#: largest error without several inputs as a multiple of that predicted from the effects of each alone; see decision 30
+PREDICTED = 1.25
 
 Word = Literal["accepted", "accepted for this duty", "unproven", "refused"]
 
@@ -162,17 +164,44 @@ class HonestError:
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Approved by {self.taken}" if self.taken else why
 
-    def may_lose(self, names: Sequence[str]) -> bool:
-        """Return whether the model was judged without these inputs, with a smaller error than without compensation.
+    def may_lose(self, names: Sequence[str], most: int = 1) -> bool:
+        """Return whether the error without these inputs is judged, or predicted, to be below that without compensation.
 
         This must hold for each input alone as well: a second failure must not re-enable a correction stopped by the
         first one.
+
+        Parameters
+        ----------
+        names : sequence of str
+            In their model order.
+        most : int
+            Largest number of inputs for which an error that was not judged is predicted from those with one lost.
         """
-        return max(self.lost.get(key, math.inf) for key in (*names, ", ".join(names))) <= self.none_rms
+        if max((self.lost.get(n, math.inf) for n in names), default=math.inf) > self.none_rms:
+            return False
+        if (judged := self.lost.get(", ".join(names))) is not None:
+            return judged <= self.none_rms
+        return len(names) <= most and sum(map(self.effect, names)) <= self.most_effect
+
+    def effect(self, name: str) -> float:
+        """Return the error that the loss of an input adds, of which that without it is the root sum of squares."""
+        return math.sqrt(max(self.lost[name] ** 2 - self.rms**2, 0.0))
+
+    @property
+    def most_effect(self) -> float:
+        """Largest sum of effects with which a model may run; -1 if losses of several inputs were judged instead."""
+        if any(", " in key for key in self.lost):
+            return -1.0
+        return math.sqrt(max((self.none_rms / PREDICTED) ** 2 - self.rms**2, 0.0))
 
     def widening(self, names: Sequence[str]) -> float:
         """Return the factor by which the error increases without these inputs, in their model order; at least 1."""
-        return max(1.0, self.lost.get(", ".join(names), 0.0) / self.rms) if self.rms else 1.0
+        if not self.rms or not names:
+            return 1.0
+        known = self.lost.get(", ".join(names))
+        if known is None and len(names) > 1 and all(n in self.lost for n in names):
+            known = PREDICTED * math.hypot(self.rms, sum(map(self.effect, names)))
+        return max(1.0, (known or 0.0) / self.rms)
 
     def check_may_run(self, target: str) -> None:
         """Raise `InputError` if the model of a target must not run; see `ErrorModel.check_may_run`."""

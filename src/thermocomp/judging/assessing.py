@@ -11,6 +11,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.starting import find_offsets
 from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage
 from thermocomp.judging.compare import split_by_cycle
@@ -28,7 +29,6 @@ from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start, find_starts
-from thermocomp.runtime.starting import find_offsets
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Judged:
         Names of the recordings, and their initial states.
     offsets : dict of str to dict of str to float
         By recording, then by temperature: those that start off the others; see
-        `thermocomp.runtime.starting.find_offsets` [degC].
+        `thermocomp.core.starting.find_offsets` [degC].
     """
 
     models: tuple[ErrorModel, ...]
@@ -111,10 +111,10 @@ def assess(
             samples = drop_unsound(stack_for(model, recordings, starts), recordings)
             watched = None if model.watch is None else stack_watched(model.watch, model.target, recordings, starts)
             samples = _called_as_in(model, samples)
-            for name, zero in zip(samples.test_names, samples.reference().tolist(), strict=True):
-                offsets.setdefault(name, {}).update(find_offsets(model.inputs, zero, model.thresholds))
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
             samples, widening = believe(model, samples, every, watched)
+            for name, zero in zip(samples.test_names, samples.reference().tolist(), strict=True):
+                offsets.setdefault(name, {}).update(find_offsets(model.inputs, zero, model.thresholds))
             guard = _guard(model, samples, watched, guards)
             looked = model.watch is not None and can_look(model.watch, watched or samples)
             names = model.watch.failing if model.watch is not None and looked else ()

@@ -13,8 +13,8 @@ from thermocomp.judging.watchrun import run_watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 
-#: largest number of temperatures for which simultaneous failures of two are tried
-FEW = 6
+#: largest number of temperatures for which simultaneous failures of two are tried; with more, their effect is predicted
+FEW = 8
 
 
 @dataclass(frozen=True)

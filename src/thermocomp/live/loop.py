@@ -11,6 +11,7 @@ from pathlib import Path
 from thermocomp.core.correction import Correction
 from thermocomp.core.ports import Confirming, Probe, Remembering, Sink, Source, Suspending, TargetStatus
 from thermocomp.core.reading import Measurement, Reading
+from thermocomp.core.starting import describe_start
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
 from thermocomp.live.events import Events
@@ -26,7 +27,6 @@ from thermocomp.live.startvalues import WAITS, AtStart, StartValues
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
-from thermocomp.runtime.starting import describe_start
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
 from thermocomp.runtime.watch import UNSURE
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.shown import shorten
+from thermocomp.core.starting import describe_offsets
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import Cost, Fault, FaultLog, find_costs, find_faults
 from thermocomp.recordings.recording import Recording
@@ -18,7 +19,6 @@ from thermocomp.report.drawing import Drawn, add_legend, drawing, name_ticks, sv
 from thermocomp.report.figures import LETTERS, LONGEST, MEASURED, POINTS, PREDICTED, SHADE
 from thermocomp.report.layout import Column, Layout
 from thermocomp.report.sections import Section, Shown
-from thermocomp.runtime.starting import describe_offsets
 
 #: colours by kind of failure
 TINTS = {

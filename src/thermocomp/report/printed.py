@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from thermocomp.core.starting import describe_offsets
 from thermocomp.judging import coverage
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.choice import Choice, Table
@@ -20,7 +21,6 @@ from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
-from thermocomp.runtime.starting import describe_offsets
 
 BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 

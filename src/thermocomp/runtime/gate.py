@@ -17,8 +17,8 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
+from thermocomp.core.starting import find_middle, find_start_span
 from thermocomp.core.thresholds import Thresholds
-from thermocomp.runtime.starting import find_middle, find_start_span
 
 #: any finite number
 ANY = (-sys.float_info.max, sys.float_info.max)

@@ -21,6 +21,7 @@ from thermocomp.recordings.checks.findings import (
     speed_changes,
 )
 from thermocomp.recordings.checks.jumps import jumps
+from thermocomp.recordings.checks.leaks import leaks
 from thermocomp.recordings.checks.spikes import spikes
 from thermocomp.recordings.checks.stuck import stuck
 from thermocomp.recordings.checks.timeunits import time_unit
@@ -108,6 +109,7 @@ def _together(
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))
     yield from leaps
+    yield from leaks(of["temperature"], of["displacement"], moved)
     leaping = {f.channel for f in leaps}  # the effect of such a step on the regression is undefined
     yield from clocks([s for s in signals if s.channel.name not in leaping], time, speed)
 

@@ -246,12 +246,24 @@ def _judged(models: tuple[ErrorModel, ...], sensors: tuple[str, ...]) -> dict[st
             several = [name for name in own if name in key.split(", ")]
             if len(several) > 1 and ", ".join(several) == key and m.may_lose(several):
                 judged.append((k, [s in several for s in sensors]))
+    effect = [
+        [_effect(m, name) if m.may_lose([name]) and m.most_lost([name]) > 1 else ANY[1] for name in sensors]
+        for m in models
+    ]
     return {
+        "effect": effect,
+        "most_effect": [m.honest_error.most_effect if m.honest_error else -1.0 for m in models],
+        "most_lost": [len(m.watch.names) // 4 if m.watch else 1 for m in models],
         "leans_on": [[s in m.sensors for s in sensors] for m in models],
         "may_lose": [[m.may_lose([s]) for s in sensors] for m in models],
         "judged_model": [k for k, _ in judged],
         "judged_without": [which for _, which in judged],
     }
+
+
+def _effect(model: ErrorModel, name: str) -> float:
+    found = model.honest_error
+    return found.effect(name) if found and name in found.lost else ANY[1]
 
 
 def _watch_sizes(watch: Watch | None) -> dict[str, int]:

@@ -326,12 +326,14 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     for m in each("m", t.line_begin[k], t.line_begin[k + 1]):
         lost = let("lost", integer(0))
         allowed = let("allowed", flag(True))
+        effects = let("effects", real(0.0))
         for i in each("i", t.FAILING):
             with when(s.fault[i].differs(GOOD) & t.leans_on[m, i]):
                 lost.set(lost + 1)
+                effects.set(effects + t.effect[m, i])
                 allowed.set(allowed & t.may_lose[m, i] & ((i < t.SENSORS) | s.fault[i].differs(OFF)))
         with when(lost > 1):
-            found = let("found", flag(False))
+            found = let("found", (lost <= t.most_lost[m]) & (effects <= t.most_effect[m]))
             for j in each("j", t.JUDGED):
                 fits = let("fits", t.judged_model[j].equals(m))
                 for i in each("i", t.FAILING):
