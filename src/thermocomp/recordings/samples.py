@@ -233,7 +233,7 @@ class Samples:
     def model_inputs(self, columns: Sequence[int], rows: BoolArray | IntArray) -> tuple[Input, ...]:
         """Return the inputs of a model fitted to `rows`, with the reference and trained range of each."""
         change = self.change()[rows]
-        zero = np.median(self.reference()[np.unique(self.test[rows])], axis=0)  # a sensor may be shifted in some tests
+        zero = _usual(self.reference()[np.unique(self.test[rows])], self.rezeroed)
         return tuple(
             Input(
                 name=self.inputs[j].name,
@@ -250,6 +250,21 @@ class Samples:
     def frame(self) -> pd.DataFrame:
         """Return inputs minus reference as a table with the names of the inputs."""
         return pd.DataFrame(self.change(), columns=[c.name for c in self.inputs])
+
+
+def _usual(zeros: FloatArray, own: BoolArray) -> FloatArray:
+    """Return the usual zero of each input, although a sensor may be shifted in some tests.
+
+    Parameters
+    ----------
+    zeros : ndarray of shape (n_tests, n_inputs)
+    own : ndarray of bool of shape (n_inputs,)
+        Inputs relative to the start of their test, which are as warm as the day.
+    """
+    if len(zeros) < 2 or not own.any():
+        return np.asarray(np.median(zeros, axis=0))
+    day = np.where(own, np.median(zeros[:, own], axis=1, keepdims=True), 0.0)
+    return np.asarray(np.median(zeros - day, axis=0) + np.median(day, axis=0))
 
 
 def usual_step(step: FloatArray) -> float:
