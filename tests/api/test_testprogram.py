@@ -95,19 +95,23 @@ def test_linuxcnc_runs_it(trial: Trial, every: float, tmp_path: Path) -> None:
     assert calls[-1].kind == "end"
 
 
-def test_the_sheet_filled_in_is_a_recording(tmp_path: Path) -> None:
-    rows = list(csv.reader(io.StringIO(write_sheet(GRID[1], CHANNELS, 600.0))))
+@pytest.mark.parametrize("kind", ["stop", "random"])
+def test_the_sheet_filled_in_is_a_recording(kind: str, tmp_path: Path) -> None:
+    trial = next(t for t in GRID if t.kind == kind)
+    order, *rows = csv.reader(io.StringIO(("" if kind == "random" else "\n") + write_sheet(trial, CHANNELS, 600.0)))
+    assert order == (["# speeds in a random order", " seed 0"] if kind == "random" else [])
     assert rows[0] == ["time_min", "spindle_rpm", "t_bearing_C", "z_um", "action"]
-    assert rows[3][-1] == "record all values, then run at 864 1/min"
+    assert rows[3][-1] == f"record all values, then run at {trial.speeds[0]:.0f} 1/min"
     filled = [rows[0], *([*row[:2], f"{20 + k / 10}", f"{k}", row[-1]] for k, row in enumerate(rows[1:]))]
     path = tmp_path / "filled.csv"
-    path.write_text("\n".join(",".join(f'"{c}"' if "," in c else c for c in row) for row in filled), encoding="utf-8")
+    lines = [",".join(order), *(",".join(f'"{c}"' if "," in c else c for c in row) for row in filled)]
+    path.write_text("\n".join(lines), encoding="utf-8")
     found = recordings.read(path)
-    assert found.time[-1] == GRID[1].duration
+    assert found.time[-1] == trial.duration
     assert [c.name for c in found.channels] == ["spindle_rpm", "t_bearing_C", "z_um"]
     speed = found.table["spindle_rpm"]
     assert speed[0] == speed[2] == 0.0 < speed[3]  # a row tells what led to it
-    assert speed.max() == 864.0
+    assert speed.max() == trial.speed
 
 
 def test_a_channel_is_no_formula_on_the_sheet() -> None:

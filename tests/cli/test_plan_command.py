@@ -37,10 +37,36 @@ def test_it_prints_the_tests_and_writes_the_best(drift: str, capsys: pytest.Capt
 def test_more_than_one_target_and_a_length(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["plan", drift, "--target", "z_um", "x_um", "--no-curve", "--hours", "4", "--swing", "0", "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
-    assert len(content["candidates"]) == 15
+    assert len(content["candidates"]) == 16
     assert {sum(s["duration_s"] for s in c["steps"]) for c in content["candidates"]} == {4.25 * 3600}
     assert content["curve"] is None
     assert content["files"] == []
+
+
+def test_speeds_in_a_random_order_are_a_proof(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [
+        "plan",
+        drift,
+        "--target",
+        "z_um",
+        "--no-curve",
+        "--hours",
+        "5",
+        "--proof",
+        "--seed",
+        "7",
+        "-o",
+        "proof.ngc",
+    ]
+    assert run([*given, "--probe-every", "0"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Next: 5 runs of 0.5 h at 600 to 3,000 1/min in a random order (seed 7), each with a stop" in told
+    program = Path("proof.ngc").read_text(encoding="ascii")
+    assert "in a random order seed 7 each" in program
+    speeds = [int(line[1:].split()[0]) for line in program.splitlines() if line.startswith("S")]
+    assert sorted(speeds) == [600, 1200, 1800, 2400, 3000]
+    assert speeds != sorted(speeds)
+    assert Path("proof.csv").read_text(encoding="utf-8").startswith("# speeds in a random order, seed 7\ntime_min,")
 
 
 def test_a_running_test_may_end_or_not(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,7 +102,7 @@ def test_what_cannot_be_is_refused_and_nothing_written(
 def test_in_python_it_is_a_table_a_figure_and_a_sentence(tmp_path: Path) -> None:
     found = tc.plan(small_machine(), "z_um", top_speed=6000.0, hours=6)
     table = found.to_frame()
-    assert len(table) == 16
+    assert len(table) == 17
     assert table["gain"].is_monotonic_decreasing
     assert found.next.trial.speed == 6000.0
     assert found.curve is not None

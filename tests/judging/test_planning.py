@@ -1,6 +1,7 @@
 """Which test next: what is missing is proposed, and what was learned is proposed no more."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -57,7 +58,7 @@ def planned(*recordings: Recording, swing: float = 5.0) -> Plan:
 
 def test_the_grid_is_all_of_one_length_and_as_stated() -> None:
     grid = make_grid(TOP, 6.0)
-    assert len(grid) == len(SPEEDS) * len(KINDS) + 1
+    assert len(grid) == len(SPEEDS) * len(KINDS) + 2
     assert {t.duration for t in grid} == {6.25 * 3600}
     assert {t.speed for t in grid} == {0.0, 600.0, 1200.0, 1800.0, 2400.0, 3000.0}
     assert {t.words for t in grid if t.speed == 600.0} == {
@@ -65,6 +66,33 @@ def test_the_grid_is_all_of_one_length_and_as_stated() -> None:
         "600 1/min for 3 h, then a stop of equal length",
         "600 1/min for 6 h",
     }
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_random_order_is_one_of_all_speeds_and_repeatable(seed: int) -> None:
+    (trial,) = [t for t in make_grid(TOP, 10.0, seed) if t.kind == "random"]
+    assert trial.words == (
+        f"10 runs of 0.5 h at 600 to 3,000 1/min in a random order (seed {seed}), each with a stop of equal length"
+    )
+    first, second = trial.speeds[:5], trial.speeds[5:]
+    assert sorted(first) == sorted(second) == [600.0, 1200.0, 1800.0, 2400.0, 3000.0]
+    assert first != second
+    assert trial in make_grid(TOP, 10.0, seed)
+    assert trial not in make_grid(TOP, 10.0, seed + 1)
+
+
+def test_a_negative_seed_is_refused() -> None:
+    with pytest.raises(InputError, match="seed -1: expected 0 or a positive"):
+        plan(stack([recorded(cycles(ALL))], ["z_um"]), TOP, seed=-1)
+
+
+def test_a_random_order_has_the_speeds_that_are_missing() -> None:
+    found = planned(recorded(cycles([600.0, 900.0, 1200.0, 700.0])))
+    (varied,) = [c for c in found.candidates if c.trial.kind == "random"]
+    assert varied.news == "no run at about 1,800, 2,400, 3,000 1/min"
+    assert varied.gain_range == (0.5 * varied.gain, 1.7 * varied.gain)
+    (whole,) = [c for c in planned(recorded(cycles(ALL))).candidates if c.trial.kind == "random"]
+    assert whole.news == ""
 
 
 def test_a_machine_that_was_never_fast_is_to_run_fast() -> None:
@@ -145,7 +173,7 @@ def test_one_cycle_is_enough_to_plan_from() -> None:
         ({"swing": -3.0}, "change of the room temperature -3 degC"),
     ],
 )
-def test_a_setting_that_cannot_be_is_refused(given: dict[str, float], words: str) -> None:
+def test_a_setting_that_cannot_be_is_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         plan(one_cycle(), **{"top_speed": TOP, **given})
 

@@ -44,12 +44,15 @@ class Planned(Result):
         Channels to be recorded in a test.
     trouble : tuple of str
         Data-quality problems of the recordings.
+    proof : bool
+        The next test is that with speeds in a random order.
     """
 
     plan: Plan
     curve: LearningCurve | None
     channels: tuple[Channel, ...]
     trouble: tuple[str, ...] = ()
+    proof: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as a dict, as printed by ``--json``."""
@@ -72,8 +75,8 @@ class Planned(Result):
 
     @property
     def next(self) -> Candidate:
-        """Test with the largest expected benefit."""
-        return self.plan.candidates[0]
+        """Test with the largest expected benefit, or with `proof` that with speeds in a random order."""
+        return next(c for c in self.plan.candidates if not self.proof or c.trial.kind == "random")
 
     def to_frame(self) -> pd.DataFrame:
         """Return the candidate tests, a row each, ranked by expected benefit."""
@@ -84,6 +87,8 @@ class Planned(Result):
                 "speed": [c.trial.speed for c in self.plan.candidates],
                 "hours": [c.trial.duration / 3600 for c in self.plan.candidates],
                 "gain": [c.gain for c in self.plan.candidates],
+                "least_gain": [c.gain_range[0] for c in self.plan.candidates],
+                "most_gain": [c.gain_range[1] for c in self.plan.candidates],
                 "expected": [c.doubt for c in self.plan.candidates],
                 "news": [c.news for c in self.plan.candidates],
             }
@@ -134,7 +139,11 @@ class Planned(Result):
     def __str__(self) -> str:
         best = self.next
         why = f" ({best.news})" if best.news else ""
-        found = [f"Next: {best.trial.words}; expected gain {best.gain:.2f} um of {self.plan.expected:.2f} um{why}."]
+        low, high = best.gain_range
+        found = [
+            f"Next: {best.trial.words}; expected gain {best.gain:.2f} um ({low:.2f} to {high:.2f}) of "
+            f"{self.plan.expected:.2f} um{why}."
+        ]
         if self.curve is not None:
             found.append(f"So far: {self.curve.words}.")
         return " ".join([*found, *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])])
@@ -147,6 +156,7 @@ def _candidate(c: Candidate) -> dict[str, Any]:
         "speed_1_min": c.trial.speed,
         "steps": [{"speed_1_min": speed, "duration_s": duration} for speed, duration in c.trial.steps],
         "gain_um": c.gain,
+        "gain_range_um": c.gain_range,
         "expected_um": c.doubt,
         "news": c.news,
     }
@@ -159,6 +169,8 @@ def plan(
     top_speed: float | None = None,
     hours: float = 12.0,
     swing: float = 5.0,
+    proof: bool = False,
+    seed: int = 0,
     inputs: str | Sequence[str] | None = None,
     split: str | None = None,
     leave_one: LeaveOne | None = None,
@@ -182,6 +194,11 @@ def plan(
         Duration of the next test [h].
     swing : float
         Largest change of the ambient temperature at the machine during the test [degC]; 0: none.
+    proof : bool
+        Propose the test with speeds in a random order, whatever its benefit: its cycles, all in one recording, can
+        prove a model, because no trend or daily rhythm follows such an order.
+    seed : int
+        Seed of the random order of speeds.
     inputs, split, leave_one, absolute, starts, zero_over, mapping
         As for `compare`.
     curve : bool
@@ -225,13 +242,13 @@ def plan(
     judging = _units(ready) if curve else Judging("", ())
     worth_it = len(judging.splits) > 2
     listener.begin(lambda: 1 + (learningcurve.n_pieces(judging) if worth_it else 0))
-    found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing)
+    found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing, seed=seed)
     progress("test errors predicted")
     learned = None
     if worth_it:
         learned = learningcurve.learning_curve(ready.samples, judging, jobs=jobs, progress=progress)
     channels = (*ready.samples.inputs, *ready.samples.targets)
-    return Planned(found, learned, channels, tuple(ready.trouble))
+    return Planned(plan=found, curve=learned, channels=channels, trouble=tuple(ready.trouble), proof=proof)
 
 
 def _units(ready: Prepared) -> Judging:

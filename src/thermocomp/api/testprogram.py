@@ -115,6 +115,8 @@ def write_sheet(trial: Trial, channels: Sequence[Channel], every: float = 0.0) -
     text = io.StringIO()
     sheet = csv.writer(text, lineterminator="\n")
     names = [c.name for c in channels if c.quantity != "spindle_speed"]
+    if trial.kind == "random":
+        text.write(f"# speeds in a random order, seed {trial.seed}\n")
     sheet.writerow(["time_min", "spindle_rpm", *map(defuse, names), "action"])
     parts = list(stretches(trial, every))
     before = 0.0
@@ -212,7 +214,7 @@ def _head(trial: Trial, dialect: Dialect, every: float) -> Iterator[str]:
         yield "%"
         yield "O1001 (THERMAL TEST)"
     yield _comment("thermal test, planned by thermocomp", dialect)
-    yield _comment(trial.words.replace(",", ""), dialect)
+    yield _comment(trial.words.translate(str.maketrans("", "", ",()")), dialect)
     yield _comment(f"total {clock(trial.duration)} h, no axis moves", dialect)
     yield _comment("before the start: machine rested, spindle free to turn, door closed", dialect)
     if trial.kind == "room":

@@ -80,6 +80,7 @@ def _show(found: Planned, files: list[Path]) -> None:
     columns = (
         Column("next test", lambda c: c.trial.words),
         Column("expected gain", lambda c: c.gain, ".2f", "um"),
+        Column("range", lambda c: f"{c.gain_range[0]:.2f} to {c.gain_range[1]:.2f}", ">", "um"),
         Column("expected error during the test", lambda c: c.doubt, ".2f", "um"),
         Column("new conditions", lambda c: c.news),
     )

@@ -27,6 +27,8 @@ _STEP = 60.0
 _EVERY = 5
 #: speeds that differ by less than this fraction of the top speed are merged
 SAME = 0.1
+#: range of the actual gain relative to the expected one: as that of the errors in the validation of the planner
+ACCURACY = (0.5, 1.7)
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,11 @@ class Candidate:
     doubt: float
     gain: float
     news: str
+
+    @property
+    def gain_range(self) -> tuple[float, float]:
+        """Range in which the actual gain is to be expected [um]."""
+        return ACCURACY[0] * self.gain, ACCURACY[1] * self.gain
 
 
 @dataclass(frozen=True)
@@ -90,6 +97,10 @@ class Covered:
         if trial.kind == "room":
             most = max(self.rooms)
             return f"the room temperature changed by at most {most:.1f} degC" if most < 0.5 * swing else ""
+        if trial.kind == "random":
+            runs, same = [v for v, _, _ in self.runs], SAME * top_speed
+            new = [v for v in sorted(set(trial.speeds)) if not any(abs(v - own) <= same for own in runs)]
+            return f"no run at about {', '.join(f'{v:,.0f}' for v in new)} 1/min" if new else ""
         fastest = max((v for v, _, _ in self.runs), default=0.0)
         near = [run for run in self.runs if abs(run[0] - trial.speed) <= SAME * top_speed]
         if not near:
@@ -128,8 +139,10 @@ class Plan:
     covered: Covered
 
 
-def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
+def make_grid(top_speed: float, hours: float, seed: int = 0) -> tuple[Trial, ...]:
     """Return the tests to be compared, all of the same duration.
+
+    In the random order every speed occurs once before one occurs again: the order is then independent of trends.
 
     Parameters
     ----------
@@ -137,6 +150,8 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
         Maximum spindle speed of the machine [1/min].
     hours : float
         Duration of each test, after a stop of 15 min [h].
+    seed : int
+        Seed of the random order of speeds.
     """
     if not 0 < top_speed < np.inf:
         raise InputError(f"top speed {top_speed:g} 1/min: expected the maximum speed of the machine, above 0")
@@ -152,10 +167,17 @@ def make_grid(top_speed: float, hours: float) -> tuple[Trial, ...]:
             "run": ((speed, length),),
         }
         found += [Trial(kind, speed, ((0.0, REST), *steps[kind])) for kind in KINDS]
+    rng = np.random.default_rng(seed)
+    orders = [rng.permutation(SPEEDS) for _ in range(-(-times // len(SPEEDS)))]
+    drawn = [float(round(share * top_speed)) for share in np.concatenate(orders)[:times]]
+    varied = tuple(step for speed in drawn for step in ((speed, SHORT), (0.0, SHORT)))
+    found.append(Trial("random", max(drawn), ((0.0, REST), *varied), seed))
     return (*found, Trial("room", 0.0, ((0.0, REST), (0.0, length))))
 
 
-def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0) -> Plan:
+def plan(
+    samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0, seed: int = 0
+) -> Plan:
     """Rank possible next tests by their expected benefit.
 
     The expected error follows from the covariance of the weights of `averaged` (`thermocomp.models.doubt`), over all
@@ -172,7 +194,11 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     swing : float
         Change of the room temperature within this duration [degC]; 0: the room temperature is constant, and no test of
         its effect is proposed.
+    seed : int
+        Seed of the random order of speeds.
     """
+    if seed < 0:
+        raise InputError(f"seed {seed}: expected 0 or a positive whole number")
     if not 0 <= swing <= 50:
         raise InputError(f"change of the room temperature {swing:g} degC: expected 0 to 50 degC")
     doubt = find_doubt(samples)
@@ -180,7 +206,7 @@ def plan(samples: Samples, top_speed: float | None = None, *, hours: float = 12.
     if not recorded:
         raise InputError("the spindle never turned in these recordings: record a run and a stop first, at any speed")
     top_speed = recorded if top_speed is None else top_speed
-    grid = [t for t in make_grid(top_speed, hours) if swing or t.kind != "room"]
+    grid = [t for t in make_grid(top_speed, hours, seed) if swing or t.kind != "room"]
     ambient = [AMBIENT.search(samples.inputs[j].name) is not None for j in doubt.features.temperatures]
     tables = [_foretell(t, doubt, swing, np.array(ambient)) for t in grid]
     use = _all_that_is_done(grid, tables)
@@ -207,7 +233,7 @@ def _all_that_is_done(grid: Sequence[Trial], tables: Sequence[FloatArray]) -> Fl
 
     The room temperature rises as often as it falls, so that the squares of both contributions are added.
     """
-    spindle = [f for t, f in zip(grid, tables, strict=True) if t.kind != "room"]
+    spindle = [f for t, f in zip(grid, tables, strict=True) if t.kind not in ("room", "random")]
     room = [f for t, f in zip(grid, tables, strict=True) if t.kind == "room"]
     rows = sum(map(len, spindle))
     weighed = [f * np.sqrt(rows / len(f)) for f in room]
