@@ -9,11 +9,11 @@ import thermocomp as tc
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.reading import Reading
 from thermocomp.judging.assessing import assess
-from thermocomp.judging.probing import Probed, Probings
+from thermocomp.judging.probing import Probed, Probings, find_gain
 from thermocomp.judging.replay import replay_compensated
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack
-from thermocomp.report.probings import describe_probings
+from thermocomp.report.probings import describe_gains, describe_probings
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 
@@ -97,6 +97,28 @@ def test_they_lower_the_error_of_another_day(day: Recording, fitted: tc.ErrorMod
     assert f"{two.metric('rms'):.2f} and {two.metric('mae'):.2f}; {one.metric('rms'):.2f} and " in line
     cycles = [a for a in probed.judged.assessments if not a.overall]
     assert sum(int(a.probed.at.sum()) for a in cycles if a.probed) == int(two.probed.at.sum()) if two.probed else False
+
+
+def test_without_probings_their_benefit_is_reported(day: Recording, fitted: tc.ErrorModel) -> None:
+    plain, probed = tc.assess(fitted, day), tc.assess(fitted, day, probing="every 2 h")
+    gain, (a,) = plain.judged.probing["z_um"], probed.judged.overall()
+    assert gain.rms == pytest.approx(a.metric("rms"), rel=1e-12)
+    by_cycle = [c.unprobed_metric("rms") - c.metric("rms") for c in probed.judged.assessments if not c.overall]
+    assert gain.gain == pytest.approx(np.mean(by_cycle or [a.unprobed_metric("rms") - a.metric("rms")]), rel=1e-9)
+    assert probed.judged.probing == {}
+    assert list(describe_gains(plain.judged)) == [f"z_um: {gain.words}"]
+    assert plain.to_dict()["probing_every_2_h"]["z_um"]["rms_um"] == gain.rms
+
+
+def test_the_standard_error_of_a_gain() -> None:
+    without, left = np.array([3.0, -3.0, 5.0, 5.0]), np.array([2.0, 2.0, 2.0, -2.0])
+    gain = find_gain(Probings(7200.0), without, left, np.array([0, 0, 1, 1]))
+    assert gain[1:] == pytest.approx((2.0, 2.0, 1.0))
+    assert gain.words == "a probing every 2 h would leave 2.00 um RMS (gain per cycle 2.00 +- 1.00 um)"
+    single = find_gain(Probings(7200.0), without, left, np.zeros(4, dtype=np.intp))
+    assert np.isnan(single.error)
+    assert single.words.endswith("um)")
+    assert "+-" not in single.words
 
 
 def test_too_short_for_a_probing_it_is_as_without(day: Recording, fitted: tc.ErrorModel) -> None:

@@ -296,6 +296,10 @@ class Assessed(Result, Paged):
             "seen_in_training": judged.seen,
             "starts": starts_content(judged.starts),
             "start_offsets_degC": judged.offsets,
+            "probing_every_2_h": {
+                target: {"rms_um": gain.rms, "gain_um": gain.gain, "error_um": gain.error}
+                for target, gain in judged.probing.items()
+            },
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
             "trouble": self.trouble,

@@ -20,8 +20,8 @@ from thermocomp.judging.guards import Guard, let_fail
 from thermocomp.judging.judge import judge
 from thermocomp.judging.leaks import find_learned_rows
 from thermocomp.judging.pieces import explain
-from thermocomp.judging.probing import Probings
-from thermocomp.judging.replay import are_absolute, stack_for
+from thermocomp.judging.probing import ProbingGain, Probings, find_gain
+from thermocomp.judging.replay import are_absolute, replay_compensated, stack_for
 from thermocomp.judging.results import Assessment, Rules
 from thermocomp.judging.splits import Judging, Split, join_short_cycles, name_cycles
 from thermocomp.judging.watched import believe, can_look, stack_watched
@@ -29,6 +29,9 @@ from thermocomp.recordings.checks.sound import drop_unsound
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.starts import Start, find_starts
+
+#: probings whose benefit is reported
+EVERY = Probings(7200.0)
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,9 @@ class Judged:
     offsets : dict of str to dict of str to float
         By recording, then by temperature: those that start off the others; see
         `thermocomp.core.starting.find_offsets` [degC].
+    probing : dict of str to ProbingGain
+        By target: error that a probing every two hours would leave; none if probings were given, or without a model
+        that was judged on unseen cycles.
     """
 
     models: tuple[ErrorModel, ...]
@@ -56,6 +62,7 @@ class Judged:
     validity: Validity | None = None
     starts: tuple[tuple[str, Start], ...] = ()
     offsets: dict[str, dict[str, float]] = field(default_factory=dict)
+    probing: dict[str, ProbingGain] = field(default_factory=dict)
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return the assessments of the models over all cycles, one per model."""
@@ -103,6 +110,7 @@ def assess(
         )
     told: tuple[tuple[str, Start], ...] = ()
     offsets: dict[str, dict[str, float]] = {}
+    gains: dict[str, ProbingGain] = {}
     guards: list[Guard] = []
     errors: list[Exception] = []
     for model in models:
@@ -119,6 +127,8 @@ def assess(
             looked = model.watch is not None and can_look(model.watch, watched or samples)
             names = model.watch.failing if model.watch is not None and looked else ()
             overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
+            if probings is None and model.honest_error and model.unit == "um" and not overall.failure:
+                gains |= _gain(model, samples, overall, limits, widening)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the other models keep their results
@@ -136,7 +146,23 @@ def assess(
         validity=covered,
         starts=told,
         offsets={name: off for name, off in offsets.items() if off},
+        probing=gains,
     )
+
+
+def _gain(
+    model: ErrorModel, samples: Samples, found: Assessment, limits: Limits, widening: FloatArray
+) -> dict[str, ProbingGain]:
+    """Return the error that a probing every two hours would leave, by target; empty if the test is too short."""
+    rows = np.zeros(len(samples), dtype=np.bool_)
+    places = {place: k for k, place in enumerate(zip(samples.test.tolist(), samples.row.tolist(), strict=True))}
+    mine = [places[place] for place in zip(found.test.tolist(), found.row.tolist(), strict=True)]
+    rows[mine] = True
+    ran = replay_compensated(model, samples, rows, limits, EVERY, widening)
+    if ran.probed is None or not ran.probed.at.any():
+        return {}
+    left = found.measured - ran.compensated
+    return {model.target: find_gain(EVERY, found.measured - found.predicted, left, found.cycle)}
 
 
 def _known_targets(models: Sequence[ErrorModel], recordings: Sequence[Recording]) -> list[Channel]:

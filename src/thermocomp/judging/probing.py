@@ -1,7 +1,9 @@
 """Probings (measurements of the tool point) during a test: their schedule and their effect."""
 
+import math
 import re
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +107,43 @@ class Probings:
         """Short description of the probings, as in all outputs."""
         often = f"{self.every / 3600:g} h" if self.every >= 3600 else f"{self.every / 60:g} min"
         return f"a probing every {often}"
+
+
+class ProbingGain(NamedTuple):
+    """Error that a model would leave with probings.
+
+    The gain is the mean over the thermal cycles of the reduction of their RMS.
+    """
+
+    plan: Probings
+    rms: float  #: over all judged rows [um]
+    gain: float  #: [um]
+    error: float  #: standard error of the gain; nan for a single cycle [um]
+
+    @property
+    def words(self) -> str:
+        """The gain as text."""
+        error = "" if math.isnan(self.error) else f" +- {self.error:.2f}"
+        return f"{self.plan.words} would leave {self.rms:.2f} um RMS (gain per cycle {self.gain:.2f}{error} um)"
+
+
+def find_gain(plan: Probings, without: FloatArray, probed: FloatArray, cycle: NDArray[np.intp]) -> ProbingGain:
+    """Return the effect of probings on a residual.
+
+    Parameters
+    ----------
+    without, probed : ndarray of shape (n_judged,)
+        Residual without and with probings [um].
+    cycle : ndarray of int of shape (n_judged,)
+        Thermal cycle of each row, different in each recording.
+    """
+
+    def rms(values: FloatArray) -> float:
+        return float(np.sqrt(np.mean(values**2)))
+
+    gains = np.array([rms(without[cycle == c]) - rms(probed[cycle == c]) for c in np.unique(cycle)])
+    error = float(gains.std(ddof=1) / math.sqrt(len(gains))) if len(gains) > 1 else math.nan
+    return ProbingGain(plan, rms(probed), float(gains.mean()), error)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Item, Layout, PrintedLine, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
-from thermocomp.report.probings import describe_probings
+from thermocomp.report.probings import describe_gains, describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_unlike
 
@@ -103,6 +103,7 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
             yield from _disturbed(a.target, a.robustness)
     bands = describe_bands(judged.models, judged.overall())
     yield from map(PrintedLine, [*describe_running(judged.overall()), *bands, *describe_probings(judged.overall())])
+    yield from map(PrintedLine, describe_gains(judged))
     fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
     if known := {name: v for name, v in fitted.items() if v is not None}:
         covered = coverage.table(known)

@@ -29,6 +29,12 @@ def describe_probings(assessments: Sequence[Assessment]) -> Iterator[str]:
             yield f"{a.target}: {len(probed.refused)} of the probings were refused; the first: {probed.refused[0]}"
 
 
+def describe_gains(judged: Judged) -> Iterator[str]:
+    """Yield the error of each target that a probing every two hours would leave."""
+    for target, gain in judged.probing.items():
+        yield f"{target}: {gain.words}"
+
+
 def section(judged: Judged, recordings: Sequence[Recording]) -> Section | None:
     """Return the section of the page about probings; None if there were none."""
     probed = [a for a in judged.overall() if a.probed is not None and not a.failure]
