@@ -53,6 +53,15 @@ def test_the_next_test_stands_in_its_gap(found: Plan) -> None:
     assert shown == f"next: {best.words}: no run faster than 3,000 1/min"
 
 
+def test_speeds_in_a_random_order_are_all_marked(found: Plan) -> None:
+    figure = plans.draw(replace(found, proof=True), None).figure
+    runs, stops, room, _ = figure.axes
+    speeds = [1200.0, 2400.0, 3600.0, 4800.0, 6000.0]
+    assert points(runs, "*") == points(stops, "*") == [(v, 0.5) for v in speeds]
+    assert points(room, "*") == []
+    assert "in a random order (seed 0)" in (figure.subfigs[0].get_suptitle() or "")
+
+
 @pytest.mark.parametrize("rooms", [(), (0.4,), tuple(0.1 * k for k in range(30))])
 def test_a_test_of_the_room_is_marked_there(found: Plan, rooms: tuple[float, ...]) -> None:
     best, *others = found.candidates

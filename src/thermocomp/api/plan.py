@@ -44,15 +44,12 @@ class Planned(Result):
         Channels to be recorded in a test.
     trouble : tuple of str
         Data-quality problems of the recordings.
-    proof : bool
-        The next test is that with speeds in a random order.
     """
 
     plan: Plan
     curve: LearningCurve | None
     channels: tuple[Channel, ...]
     trouble: tuple[str, ...] = ()
-    proof: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as a dict, as printed by ``--json``."""
@@ -75,8 +72,8 @@ class Planned(Result):
 
     @property
     def next(self) -> Candidate:
-        """Test with the largest expected benefit, or with `proof` that with speeds in a random order."""
-        return next(c for c in self.plan.candidates if not self.proof or c.trial.kind == "random")
+        """Test with the largest expected benefit, or with ``proof`` that with speeds in a random order."""
+        return self.plan.next
 
     def to_frame(self) -> pd.DataFrame:
         """Return the candidate tests, a row each, ranked by expected benefit."""
@@ -242,13 +239,13 @@ def plan(
     judging = _units(ready) if curve else Judging("", ())
     worth_it = len(judging.splits) > 2
     listener.begin(lambda: 1 + (learningcurve.n_pieces(judging) if worth_it else 0))
-    found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing, seed=seed)
+    found = planning.plan(ready.samples, top_speed, hours=hours, swing=swing, proof=proof, seed=seed)
     progress("test errors predicted")
     learned = None
     if worth_it:
         learned = learningcurve.learning_curve(ready.samples, judging, jobs=jobs, progress=progress)
     channels = (*ready.samples.inputs, *ready.samples.targets)
-    return Planned(plan=found, curve=learned, channels=channels, trouble=tuple(ready.trouble), proof=proof)
+    return Planned(found, learned, channels, tuple(ready.trouble))
 
 
 def _units(ready: Prepared) -> Judging:

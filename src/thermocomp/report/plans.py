@@ -26,8 +26,8 @@ def draw(plan: Plan, curve: LearningCurve | None) -> Drawn:
         _draw_runs(runs, plan)
         _draw_stops(stops, plan)
         _draw_room(room, plan)
-        best = plan.candidates[0]
-        words = f": {best.news}" if best.news else ""
+        best = plan.next
+        words = f": {best.news}" if best.news and best.trial.kind != "random" else ""
         gap.suptitle(f"next: {best.trial.words}{words}", x=0.01, ha="left", fontweight="bold", fontsize=9.5)
         axes = brings.subplots(1, 2 if curve else 1, squeeze=False)[0]
         _draw_tests(axes[0], plan)
@@ -42,9 +42,10 @@ def _draw_runs(ax: Axes, plan: Plan) -> None:
     ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7, label="recorded")
     others = {(c.trial.speed, _longest(c.trial)) for c in plan.candidates if c.trial.kind != "room"}
     ax.plot(*np.array(sorted(others)).T, "o", color=NONE, mfc="none", ms=4, lw=0, label="candidate tests")
-    best = plan.candidates[0].trial
+    best = plan.next.trial
     if best.kind != "room":
-        ax.plot(best.speed, _longest(best), label="next test", **_STAR)
+        speeds = sorted(set(best.speeds))
+        ax.plot(speeds, [_longest(best)] * len(speeds), label="next test", **_STAR)
     _finish(ax, plan, "runs", "duration of the run [h]", room=0.35)
     add_legend(ax, loc="upper left", ncols=2, fontsize=7)
 
@@ -53,9 +54,10 @@ def _draw_stops(ax: Axes, plan: Plan) -> None:
     """Plot the duration of stops against the speed of the preceding run."""
     recorded = [(v, stop / 3600) for v, _, stop in plan.covered.runs]
     ax.plot(*np.array(recorded).T, "o", color=MEASURED, ms=4, alpha=0.7)
-    best = plan.candidates[0].trial
-    if best.kind in ("repeated", "stop"):
-        ax.plot(best.speed, best.steps[2][1] / 3600, **_STAR)
+    best = plan.next.trial
+    if best.kind in ("repeated", "stop", "random"):
+        speeds = sorted(set(best.speeds))
+        ax.plot(speeds, [best.steps[2][1] / 3600] * len(speeds), **_STAR)
     _finish(ax, plan, "stops after a run", "duration of the stop [h]")
 
 
@@ -67,7 +69,7 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
         ax.text(0.5, 0.5, "no room temperature\nwas recorded", transform=ax.transAxes, ha="center", fontsize=8)
     if plan.swing:
         ax.axhline(plan.swing, color=NONE, ls="--", lw=0.8, label=f"assumed: {plan.swing:g} degC")
-    if plan.candidates[0].trial.kind == "room":
+    if plan.next.trial.kind == "room":
         ax.plot(len(rooms) + 1, plan.swing, label="next test", **_STAR)
     ax.set_xticks(range(1, 1 + len(rooms)) if len(rooms) <= 12 else [1, len(rooms)])
     ax.set_xlim(0, max(len(rooms), 3) + 2)
@@ -110,8 +112,8 @@ def _longest(trial: Trial) -> float:
 
 def _finish(ax: Axes, plan: Plan, title: str, what: str, room: float = 0.1) -> None:
     """Shade the speed range of the next test, label the axes, and leave room above the points."""
-    best = plan.candidates[0].trial
-    if best.kind != "room":
+    best = plan.next.trial
+    if best.kind not in ("room", "random"):
         near = SAME * plan.top_speed
         ax.axvspan(best.speed - near, best.speed + near, color=SHADE, lw=0, zorder=0, label="treated as the same speed")
     ax.axvline(plan.top_speed, color=NONE, ls=":", lw=0.8)

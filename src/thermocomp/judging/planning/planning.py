@@ -129,6 +129,8 @@ class Plan:
         Settings of the grid [1/min], [h], [degC].
     covered : Covered
         Conditions recorded so far.
+    proof : bool
+        The next test is that with speeds in a random order.
     """
 
     candidates: tuple[Candidate, ...]
@@ -137,6 +139,12 @@ class Plan:
     hours: float
     swing: float
     covered: Covered
+    proof: bool = False
+
+    @property
+    def next(self) -> Candidate:
+        """Test with the largest expected benefit, or with `proof` that with speeds in a random order."""
+        return next(c for c in self.candidates if not self.proof or c.trial.kind == "random")
 
 
 def make_grid(top_speed: float, hours: float, seed: int = 0) -> tuple[Trial, ...]:
@@ -176,7 +184,13 @@ def make_grid(top_speed: float, hours: float, seed: int = 0) -> tuple[Trial, ...
 
 
 def plan(
-    samples: Samples, top_speed: float | None = None, *, hours: float = 12.0, swing: float = 5.0, seed: int = 0
+    samples: Samples,
+    top_speed: float | None = None,
+    *,
+    hours: float = 12.0,
+    swing: float = 5.0,
+    proof: bool = False,
+    seed: int = 0,
 ) -> Plan:
     """Rank possible next tests by their expected benefit.
 
@@ -194,6 +208,8 @@ def plan(
     swing : float
         Change of the room temperature within this duration [degC]; 0: the room temperature is constant, and no test of
         its effect is proposed.
+    proof : bool
+        The next test is that with speeds in a random order.
     seed : int
         Seed of the random order of speeds.
     """
@@ -225,6 +241,7 @@ def plan(
         hours=hours,
         swing=swing,
         covered=covered,
+        proof=proof,
     )
 
 
