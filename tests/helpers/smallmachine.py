@@ -13,11 +13,16 @@ from thermocomp.recordings.recording import Recording
 
 
 def small_machine(
-    speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0), *, seed: int = 0, dt: float = 60.0
+    speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0),
+    *,
+    seed: int = 0,
+    dt: float = 60.0,
+    noise: float = 0.02,
 ) -> Recording:
     """Return a drift test: lags of 20 and 90 minutes in the drift, of 20 and 45 minutes in the sensors.
 
-    A larger `dt` [s] is enough where the size of the recording is not what is tested.
+    A larger `dt` [s] is enough where the size of the recording is not what is tested; `noise` is that of the sensors
+    [degC].
     """
     rng = np.random.default_rng(seed)
     half = round(6000 / dt)
@@ -31,9 +36,9 @@ def small_machine(
     between = lagbank.run(heat[:, 1:], steps, np.array([2700.0]))[:, 0]
     table = pd.DataFrame(
         {
-            "t1_C": 22 + 2.0 * fast + ambient + 0.02 * rng.normal(size=len(time)),
-            "t2_C": 21 + 1.5 * between + ambient + 0.02 * rng.normal(size=len(time)),
-            "t3_C": 20.5 + ambient + 0.02 * rng.normal(size=len(time)),
+            "t1_C": 22 + 2.0 * fast + ambient + noise * rng.normal(size=len(time)),
+            "t2_C": 21 + 1.5 * between + ambient + noise * rng.normal(size=len(time)),
+            "t3_C": 20.5 + ambient + noise * rng.normal(size=len(time)),
             "spindle_rpm": speed,
             "z_um": 4.0 * fast + 6.0 * slow + 1.5 * ambient + 0.1 * rng.normal(size=len(time)),
             "x_um": -2.0 * fast + 0.05 * fast**2 + 0.1 * rng.normal(size=len(time)),
