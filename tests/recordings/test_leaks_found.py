@@ -33,7 +33,7 @@ def leaking(how: str, recording: Recording, target: str) -> Recording:
         "exact": made,
         "noisy": made + rng.normal(0.0, 0.05, len(y)),
         "rounded": made.round(1),
-        "smoothed": made.rolling(9, min_periods=1).mean(),
+        "smoothed": made.rolling(3, center=True, min_periods=1).mean(),
         "mixed": 0.5 * made + 0.5 * recording.table[first],
         "negative": 30.0 - 0.05 * y,
         "curved": 22.0 + 0.05 * y + 0.0005 * y**2,
@@ -74,6 +74,31 @@ def test_two_temperatures_computed_from_one_displacement_are_named() -> None:
     first, second = (c.name for c in demo().temperatures[:2])
     table[first], table[second] = 22.0 + 0.2 * table["z_um"], 25.0 - 0.1 * table["z_um"]
     assert sorted(named(replace(demo(), table=table))) == sorted([first, second])
+
+
+def test_interference_on_all_wires_is_a_warning() -> None:
+    table, hum = demo().table.copy(), np.random.default_rng(3).normal(size=len(demo()))
+    for channel in demo().temperatures:
+        table[channel.name] += 0.2 * hum
+    table["z_um"] += 2.0 * hum
+    hummed = replace(demo(), table=table)
+    assert not named(hummed)
+    assert [f.severity for f in check(hummed) if f.kind == "interference"] == ["warning"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_chiller_that_reaches_two_places_with_different_lags_is_no_leak(seed: int) -> None:
+    rng, state = np.random.default_rng(seed), 1.0
+    on = list[float]()
+    while len(on) < 20 * len(demo()):  # one value a second, switched every two to four minutes
+        on += [state] * int(rng.integers(120, 240))
+        state = -state
+    seconds = pd.Series(on[: 20 * len(demo())])
+    near, far = (seconds.ewm(halflife=lag).mean().to_numpy()[::20] for lag in (15.0, 45.0))
+    table, name = demo().table.copy(), demo().temperatures[13].name
+    table[name] += 0.5 * near
+    table["z_um"] += 2.0 * far
+    assert not named(replace(demo(), table=table))
 
 
 def test_curves_without_noise_are_not_examined() -> None:

@@ -54,7 +54,7 @@ def describe_offsets(offsets: Mapping[str, float]) -> str:
     told = [f"{name} {offset:+.1f} degC" for name, offset in sorted(offsets.items(), key=lambda o: -abs(o[1]))]
     return (
         f"compared with the training, these start off the other temperatures: {', '.join(told)}: shifted sensors, or "
-        "a machine that had not cooled; only their rises from here on are used"
+        "a machine that had not settled; only their rises from here on are used"
         if told
         else ""
     )

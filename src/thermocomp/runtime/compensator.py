@@ -394,7 +394,7 @@ def _unjudged(models: Sequence[ErrorModel], failed: Mapping[str, str]) -> str:
         lost = [n for n in failed if n in model.sensors]
         if lost and not model.may_lose(lost):
             return (
-                f"without {' and '.join(lost)}, the model of {model.target} is worse than no compensation or was "
-                "not tested"
+                f"without {' and '.join(lost)}, the model of {model.target} is not known to be better than no "
+                "compensation"
             )
     return ""

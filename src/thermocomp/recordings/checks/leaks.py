@@ -14,6 +14,10 @@ BLOCKS = (1, 2, 4)
 LEAST, CERTAIN = 0.25, 9.0
 #: largest correlation of a difference with the next one: -0.75 for white noise, above 0 for a smooth curve
 NOISE = -0.2
+#: numbers of rows after which the correlation of noise has ended, and smallest share of it that is left in a process
+LATER, LASTING = range(12, 42), 0.5
+#: largest difference of the correlations one row earlier and later, relative to that of the same row: neither lags
+LAGS = 0.35
 #: minimum number of differences
 _ENOUGH = 30
 
@@ -24,9 +28,10 @@ def leaks(temperatures: Sequence[Signal], displacements: Sequence[Signal], moved
     Third differences of recorded rows contain the noise of the instruments, and hardly any heat; those within three
     rows of a change of the spindle speed are left out. Their rank correlation, times the root of their number, is at
     most 7.6 (243,000 pairs of a temperature and a displacement of virtual machines; 6.1 of real ones), and 10 to 90 if
-    the temperature is computed from the displacement, also if it is smoothed, rounded or mixed with another. Curves
+    the temperature is computed from the displacement, also if it is rounded, noisy or mixed with another. Curves
     without noise are not examined. If a displacement has the noise of two temperatures that do not have that of each
-    other, it was computed from them, as in a simulation.
+    other, it was computed from them, as in a simulation. Noise that more than half of the temperatures share with a
+    displacement is interference, which is only a warning.
 
     Parameters
     ----------
@@ -47,10 +52,16 @@ def leaks(temperatures: Sequence[Signal], displacements: Sequence[Signal], moved
                 own = all(_certainty(heat[name], heat[other]) >= CERTAIN for other in certain if other != name)
                 if own and c > found.get(name, (0.0, ""))[0]:
                     found[name] = c, probe.channel.name
+    if len(found) > max(1, len(temperatures) // 2):
+        names = ", ".join(found)
+        text = f"{names} have the noise of the displacements: interference on all wires; check shields and earth"
+        yield Finding("warning", "", "interference", text)
+        return
     for name, (_, probe_name) in found.items():
         text = (
-            f"has the noise of {probe_name}, which heat cannot transmit: it seems to be computed from the displacement "
-            "or to share its wiring. A model that uses it predicts the displacement from itself; leave it out"
+            f"has the noise of {probe_name}, in the same rows: it seems to be computed from the displacement, or to "
+            "share its wiring. A model that uses it predicts the displacement from itself; leave it out. If something "
+            "switches every few rows, as a chiller may, record more often"
         )
         yield Finding("trouble", name, "leak", text, remedy=column(name, role="ignore"))
 
@@ -73,8 +84,17 @@ def _noise(signal: Signal, still: BoolArray, block: int) -> FloatArray | None:
 
 
 def _certainty(x: FloatArray, y: FloatArray) -> float:
-    """Return the correlation of ranks times the root of their number; 0 if it is small."""
+    """Return the correlation of ranks times the root of their number; 0 if it is small, lags, or goes on for many rows.
+
+    What is computed follows at once, and its noise ends after a few rows; a process such as a chiller that is switched
+    on and off reaches two places with different lags, and goes on.
+    """
     both = np.flatnonzero(x * y)
-    size = float(np.sqrt((x[both] @ x[both]) * (y[both] @ y[both])))
-    r = abs(float(x @ y)) / size if size > 0.0 else 0.0
-    return r * float(np.sqrt(both.size)) if r >= LEAST else 0.0
+    size, common = float(np.sqrt((x[both] @ x[both]) * (y[both] @ y[both]))), abs(float(x @ y))
+    if common < LEAST * size or not common:
+        return 0.0
+    later = [abs(float(a[k:] @ b[:-k])) for k in LATER if k < len(x) for a, b in ((x, y), (y, x))]
+    lags = abs(float(x[1:] @ y[:-1]) - float(y[1:] @ x[:-1]))
+    if lags > LAGS * common or max(later, default=0.0) > LASTING * common:
+        return 0.0
+    return common / size * float(np.sqrt(both.size))

@@ -11,6 +11,8 @@ from thermocomp.recordings.recording import Recording
 
 #: time over which the start of a recording is averaged [s]
 START = 60.0
+#: more temperatures than this are not off because their sensors were shifted
+MOST = 3
 #: smallest offset, as a multiple of the usual difference between the starts of two recordings (robust sd)
 _USUAL = 4.0
 
@@ -21,8 +23,8 @@ def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...]
     The start of each temperature is compared with its usual start, that of the recording to which the starts of all
     recordings are nearest, after the change common to all temperatures (their median) is removed. It is off if it
     differs by more than `Thresholds.start_reported` and 4 times the robust standard deviation of all such differences.
-    A recording in which more than half of the temperatures are off started from another thermal state, which shifts no
-    sensor.
+    A recording in which more than `MOST`, or more than half of the temperatures are off started from another thermal
+    state, which shifts no sensor.
     """
     common = {c.name for c in recordings[0].temperatures} if recordings else set[str]()
     for r in recordings[1:]:
@@ -75,5 +77,5 @@ def _offsets(start: FloatArray) -> FloatArray:
     off = np.where(sound, change - usual, 0.0)
     spread = 1.4826 * float(np.median(np.abs(off[:, sound])))
     off[np.abs(off) <= max(THRESHOLDS.start_reported, _USUAL * spread)] = 0.0
-    off[(off != 0).sum(axis=1) > off.shape[1] / 2] = 0.0
+    off[(off != 0).sum(axis=1) > min(MOST, off.shape[1] / 2)] = 0.0
     return off
