@@ -8,10 +8,13 @@ import pytest
 
 import thermocomp as tc
 from thermocomp.core.machine import Channel
+from thermocomp.judging.guards import find_guard
+from thermocomp.models.watching import find_watch
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.checks.offsets import compare_starts
 from thermocomp.recordings.cycles import make_single_cycle
 from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 
 
 def day(number: int, off: Sequence[float] = (), sensors: int = 6) -> Recording:
@@ -62,6 +65,16 @@ def test_a_missing_first_value_is_no_offset() -> None:
     broken = day(2)
     broken.table.loc[:3, "t1_C"] = np.nan
     assert not found([day(0), day(1), broken, day(3)])
+
+
+def test_with_a_file_left_out_lost_sensors_are_replaced_as_at_the_machine() -> None:
+    days = [day(k) for k in range(4)]
+    samples = stack(days, ["z_um"])
+    assert find_watch(samples, samples.test != 2) is not None
+    guard = find_guard(samples, samples.test != 2, samples.test == 2)
+    assert guard is not None
+    last = guard.readings["t5_C",][5][samples.test == 2]
+    assert np.ptp(last) > 4.0  # it read its zero all day; the others tell its rise of 8 degC
 
 
 def test_check_and_fit_report_it() -> None:

@@ -99,7 +99,9 @@ class Samples:
             if self.zero is not None and not np.isnan(self.zero[k]).any():
                 zero[k] = np.where(temperatures, self.zero[k], 0.0)
                 continue
-            rows = np.flatnonzero((self.test == k) & self.valid)
+            if not (mine := self.test == k).any():
+                continue  # nothing is relative to it
+            rows = np.flatnonzero(mine & self.valid)
             if rows.size == 0:
                 names = ", ".join(c.name for c in self.inputs)
                 raise RecordingError(
@@ -140,8 +142,8 @@ class Samples:
     def _windows(self) -> Iterator[IntArray]:
         """Yield the rows averaged for the zero of each test, unless it is specified."""
         for k in range(len(self.test_names)):
-            if self.zero is None or np.isnan(self.zero[k]).any():
-                rows = np.flatnonzero((self.test == k) & self.valid)
+            rows = np.flatnonzero((self.test == k) & self.valid)
+            if rows.size and (self.zero is None or np.isnan(self.zero[k]).any()):
                 yield rows[: first_rows(self.zeroing, self.time[rows], self.stands[rows])[0]]
 
     def days(self) -> "NDArray[np.datetime64]":
