@@ -267,8 +267,8 @@ def _usual(zeros: FloatArray, own: BoolArray) -> FloatArray:
         return np.asarray(np.median(zeros, axis=0))
     day = np.where(own, np.median(zeros[:, own], axis=1, keepdims=True), 0.0)
     own_zeros = zeros - day
-    apart = np.abs(own_zeros[:, None] - own_zeros[None]).sum(axis=0)  # (n_tests, n_inputs); no mean of two levels
-    usual = np.take_along_axis(own_zeros, apart.argmin(axis=0)[None], axis=0)[0]
+    middle = np.abs(own_zeros - np.median(own_zeros, axis=0)).argmin(axis=0)  # no mean of two levels
+    usual = np.take_along_axis(own_zeros, middle[None], axis=0)[0]
     return np.asarray(usual + np.median(day, axis=0))
 
 

@@ -20,11 +20,11 @@ _USUAL = 4.0
 def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...], ...]:
     """Return for each recording the temperatures whose offset from the others begins there, or ends.
 
-    The start of each temperature is compared with its usual start, that of the recording to which the starts of all
-    recordings are nearest, after the change common to all temperatures (their median) is removed. It is off if it
-    differs by more than `Thresholds.start_reported` and 4 times the robust standard deviation of all such differences.
-    A recording in which more than `MOST`, or more than half of the temperatures are off started from another thermal
-    state, which shifts no sensor.
+    The start of each temperature is compared with its usual start, the one nearest to the median of all recordings,
+    after the change common to all temperatures (their median) is removed. It is off if it differs by more than
+    `Thresholds.start_reported` and 4 times the robust standard deviation of all such differences. A recording in which
+    more than `MOST`, or more than half of the temperatures are off started from another thermal state, which shifts no
+    sensor.
     """
     common = {c.name for c in recordings[0].temperatures} if recordings else set[str]()
     for r in recordings[1:]:
@@ -72,8 +72,8 @@ def _offsets(start: FloatArray) -> FloatArray:
     ordered, n = np.sort(change[:, sound], axis=1), int(sound.sum())
     below, above = ordered[:, [(n - 1) // 2]], ordered[:, [n // 2]]
     change -= np.where(np.abs(above) < np.abs(below), above, below)  # half of the sensors may be off together
-    apart = np.abs(change[:, None] - change[None]).sum(axis=0)  # (n_recordings, n_sensors)
-    usual = np.take_along_axis(change, apart.argmin(axis=0)[None], axis=0)
+    middle = np.abs(change - np.median(change, axis=0)).argmin(axis=0)  # of two levels that of the first recording
+    usual = np.take_along_axis(change, middle[None], axis=0)
     off = np.where(sound, change - usual, 0.0)
     spread = 1.4826 * float(np.median(np.abs(off[:, sound])))
     off[np.abs(off) <= max(THRESHOLDS.start_reported, _USUAL * spread)] = 0.0
