@@ -121,14 +121,12 @@ def assess(
             samples = _called_as_in(model, samples)
             known, every = find_learned_rows(model, samples), np.ones(len(samples), np.bool_)
             samples, widening = believe(model, samples, every, watched)
-            for name, zero in zip(samples.test_names, samples.reference().tolist(), strict=True):
-                offsets.setdefault(name, {}).update(find_offsets(model.inputs, zero, model.thresholds))
+            _add_offsets(offsets, model, samples)
             guard = _guard(model, samples, watched, guards)
             looked = model.watch is not None and can_look(model.watch, watched or samples)
             names = model.watch.failing if model.watch is not None and looked else ()
             overall, judged = _assess(model, samples, known, rules, limits, probings, widening, guard, names)
-            if probings is None and model.honest_error and model.unit == "um" and not overall.failure:
-                gains |= _gain(model, samples, overall, limits, widening)
+            gains |= _gain(model, samples, overall, limits, widening)
             covered = covered or coverage.find_validity(samples, judged, recordings)
             cut = [replace(a, learned=0) for a in split_by_cycle(overall)]
         except Exception as e:  # noqa: BLE001 - whatever fails for one model, the other models keep their results
@@ -150,10 +148,21 @@ def assess(
     )
 
 
+def _add_offsets(offsets: dict[str, dict[str, float]], model: ErrorModel, samples: Samples) -> None:
+    """Add the temperatures of a model that start off the others, by recording."""
+    for name, zero in zip(samples.test_names, samples.reference().tolist(), strict=True):
+        offsets.setdefault(name, {}).update(find_offsets(model.inputs, zero, model.thresholds))
+
+
 def _gain(
     model: ErrorModel, samples: Samples, found: Assessment, limits: Limits, widening: FloatArray
 ) -> dict[str, ProbingGain]:
-    """Return the error that a probing every two hours would leave, by target; empty if the test is too short."""
+    """Return the error that a probing every two hours would leave, by target.
+
+    Empty if the test is too short, or the model may not be probed, or was judged with probings.
+    """
+    if found.probed is not None or model.honest_error is None or model.unit != "um" or found.failure:
+        return {}
     rows = np.zeros(len(samples), dtype=np.bool_)
     places = {place: k for k, place in enumerate(zip(samples.test.tolist(), samples.row.tolist(), strict=True))}
     mine = [places[place] for place in zip(found.test.tolist(), found.row.tolist(), strict=True)]
