@@ -17,11 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench_standin import TARGETS, cases, held, left
+from bench_standin import TARGETS, cases, held, judge_losses, left
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.provenance import HonestError
-from thermocomp.judging.guards import find_guard
-from thermocomp.judging.robustness import stress
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
@@ -44,32 +42,9 @@ class Pair(NamedTuple):
     sound: float  #: with all sensors intact [um]
 
 
-def judged(samples: Samples, cycle: int) -> dict[str, HonestError]:
-    """Return the errors with sensors lost on the other cycles, each left out in turn, by target."""
-    others = [c for c in np.unique(samples.cycle[samples.cycle >= 0]).tolist() if c != cycle]
-    squares: dict[str, dict[str, float]] = {t: {} for t in TARGETS}
-    for unseen in others:
-        learn, rows = ~np.isin(samples.cycle, [cycle, unseen]), samples.cycle == unseen
-        guard = find_guard(samples, learn, rows)
-        for k, target in enumerate(TARGETS):
-            known = rows & np.isfinite(samples.deviations[:, k])
-            model, measured = train("averaged", samples, k, learn).model, samples.deviations[known, k]
-            found = stress(model, samples, measured, known, draws=1, guard=guard)
-            size, error = found.robustness, float(np.sqrt(np.mean((measured - found.predicted) ** 2)))
-            of = {**size.lost_rms, **size.together_rms, "sound": error, "none": size.none_rms, "rows": 1.0}
-            for name, rms in of.items():
-                squares[target][name] = squares[target].get(name, 0.0) + len(measured) * rms**2
-    honest = {}
-    for target, total in squares.items():
-        lost = {name: float(np.sqrt(v / total["rows"])) for name, v in total.items() if name != "rows"}
-        sound, none = lost.pop("sound"), lost.pop("none")
-        honest[target] = HonestError("", sound, sound, sound, none, none, {}, "accepted", "", lost=lost)
-    return honest
-
-
 def pairs(samples: Samples, cycle: int) -> Iterator[Pair]:
     """Yield the effect of each pair, dead and exchanged, on each target in a cycle."""
-    learn, honest = samples.cycle != cycle, judged(samples, cycle)
+    learn, honest = samples.cycle != cycle, judge_losses(samples, cycle)
     watch = find_watch(samples, learn)
     if watch is None:
         raise SystemExit("nothing to watch")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from measured import find_measured
 from thermocomp.core.correction import Correction, Limits
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.provenance import HonestError
 from thermocomp.core.watch import Watch
 from thermocomp.judging.guards import find_guard
 from thermocomp.judging.robustness import stress
@@ -64,8 +65,8 @@ def cases() -> Iterator[tuple[str, Samples]]:
     yield "fl_thermal, six", samples.only([*SIX, "spindle_rpm"])
 
 
-def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
-    """Return the sensors that each model may lose, determined on the other cycles: see `ErrorModel.may_lose`."""
+def judge_losses(samples: Samples, cycle: int) -> dict[str, HonestError]:
+    """Return the errors with sensors lost on the other cycles, each left out in turn, by target."""
     others = [c for c in np.unique(samples.cycle[samples.cycle >= 0]).tolist() if c != cycle]
     squares: dict[str, dict[str, float]] = {t: {} for t in TARGETS}
     for unseen in others:
@@ -74,10 +75,23 @@ def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
         for k, target in enumerate(TARGETS):
             known = rows & np.isfinite(samples.deviations[:, k])
             model, measured = train("averaged", samples, k, learn).model, samples.deviations[known, k]
-            found = stress(model, samples, measured, known, draws=1, guard=guard).robustness
-            for name, rms in {**found.lost_rms, "": found.none_rms}.items():
+            found = stress(model, samples, measured, known, draws=1, guard=guard)
+            size, error = found.robustness, float(np.sqrt(np.mean((measured - found.predicted) ** 2)))
+            of = {**size.lost_rms, **size.together_rms, "sound": error, "none": size.none_rms, "rows": 1.0}
+            for name, rms in of.items():
                 squares[target][name] = squares[target].get(name, 0.0) + len(measured) * rms**2
-    return {t: {name for name, v in of.items() if name and v <= of[""]} for t, of in squares.items()}
+    honest = {}
+    for target, total in squares.items():
+        lost = {name: float(np.sqrt(v / total["rows"])) for name, v in total.items() if name != "rows"}
+        sound, none = lost.pop("sound"), lost.pop("none")
+        honest[target] = HonestError("", sound, sound, sound, none, none, {}, "accepted", "", lost=lost)
+    return honest
+
+
+def replaceable(samples: Samples, cycle: int) -> dict[str, set[str]]:
+    """Return the sensors that each model may lose, determined on the other cycles: see `ErrorModel.may_lose`."""
+    honest = judge_losses(samples, cycle)
+    return {t: {name for name in of.lost if of.may_lose([name])} for t, of in honest.items()}
 
 
 def believed(

@@ -9,7 +9,7 @@ from driftmodels import judged
 from smallmachine import small_machine
 
 from thermocomp.core.correction import Limits
-from thermocomp.core.exceptions import FitError, InputError, ModelFileError
+from thermocomp.core.exceptions import FitError, InputError, ModelFileError, RecordingError
 from thermocomp.core.inputs import Support
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.machine import Channel
@@ -27,6 +27,7 @@ from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
+from thermocomp.report.summary import cautions
 from thermocomp.runtime.compensator import Compensator
 
 METHOD_NAMES = sorted(METHODS)
@@ -369,3 +370,18 @@ def test_tests_with_other_sensors_are_told_in_either_order(recording: Recording)
         with pytest.raises(InputError, match="only one of them has t2_C"):
             stack(pair, ["z_um"])
     assert len(stack([recording, poorer], ["z_um"], ["t1_C", "t3_C"]).inputs) == 2
+
+
+def test_a_watch_that_cannot_be_trained_is_a_caution(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise RecordingError("no row has a number")
+
+    monkeypatch.setattr("thermocomp.judging.compare.find_guard", fails)
+    samples = stack([small_machine(dt=300.0)], ["z_um"])
+    found = compare(samples, ["ols"], splits.leave_one_cycle_out(samples), refit=False)
+    assert set(found.unwatched.values()) == {"no row has a number"}
+    assert len(found.unwatched) == len(found.judging.splits)
+    told = [text for text in cautions(found) if "no watch could be trained without" in text]
+    assert len(told) == len(found.unwatched)
+    sound = compare(samples, ["ols"], splits.leave_one_cycle_out(samples), robustness=False)
+    assert not sound.unwatched

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
+from thermocomp.core.arrays import FloatArray
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
@@ -15,6 +18,12 @@ def find_middle(offsets: Sequence[float]) -> float:
         return 0.0
     ordered = sorted(offsets)
     return min(ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2], key=abs)
+
+
+def find_usual(rows: FloatArray) -> FloatArray:
+    """Return the value of each column that is nearest to its median: of two levels that of the first row, no mean."""
+    nearest = np.abs(rows - np.median(rows, axis=0)).argmin(axis=0)
+    return np.asarray(np.take_along_axis(rows, nearest[None], axis=0)[0])
 
 
 def find_start_span(channel: Input, thresholds: Thresholds) -> float:

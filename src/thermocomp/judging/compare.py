@@ -63,7 +63,7 @@ def compare(
     by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
     pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
     done: list[Assessment] = []
-    guards = _guards(samples, by_target, watched, jobs) if robustness and limits is not None else {}
+    guards, unwatched = _guards(samples, by_target, watched, jobs) if robustness and limits is not None else ({}, {})
     work = partial(_assess_method, samples, rules, support, robustness, limits, guards)
     scores: dict[int, dict[str, list[list[float]]]] = {}
     inners = [_inners(names, own, rules) for own in by_target]
@@ -96,27 +96,29 @@ def compare(
         left=len(names) * len(by_target) - finished,
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
+        unwatched=unwatched,
     )
 
 
 def _guards(
     samples: Samples, by_target: Sequence[Judging], watched: Sequence[str] | None, jobs: int
-) -> dict[str, Guard | None]:
-    """Return the readings that a watch passes on in each block, with the watch trained on the block's training rows."""
+) -> tuple[dict[str, Guard | None], dict[str, str]]:
+    """Return the readings that a watch passes on in each block, and why a watch could not be trained, by block.
+
+    The watch of a block is trained on its training rows.
+    """
     splits = {split.name: split for own in by_target for split in own.splits}
     known = samples if watched is None else samples.only(watched)
-    found = work_through(partial(_guard, known), list(splits.values()), _unwatched, jobs=jobs)
+    work: Callable[[Split], Guard | str | None] = partial(_guard, known)
+    found = dict(zip(splits, work_through(work, list(splits.values()), jobs=jobs), strict=True))
     names = [c.name for c in samples.inputs]
     place = [names.index(c.name) for c in known.inputs]
-    return {name: g and g.among(place) for name, g in zip(splits, found, strict=True)}
+    guards = {name: g.among(place) if isinstance(g, Guard) else None for name, g in found.items()}
+    return guards, {name: why for name, why in found.items() if isinstance(why, str)}
 
 
 def _guard(samples: Samples, split: Split) -> Guard | None:
     return find_guard(samples, split.learn, split.judge)
-
-
-def _unwatched(_split: Split, _why: str) -> None:
-    return None
 
 
 def _complete(parts: Iterable[tuple[str, Assessment]], blocks: int) -> dict[str, list[Assessment]]:

@@ -1,7 +1,7 @@
 """Rules of an evaluation, and its results: `Assessment` and `Comparison`."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -232,6 +232,8 @@ class Comparison:
         Per target, if there was a choice.
     starts : tuple of (str, Start)
         Names of the recordings, and their initial states.
+    unwatched : dict of str to str
+        Blocks for which no watch could be trained, and why: the loss of a sensor is judged there as if undetected.
     """
 
     judging: Judging
@@ -240,6 +242,7 @@ class Comparison:
     left: int = 0
     recommended: tuple[Recommendation, ...] = ()
     starts: tuple[tuple[str, Start], ...] = ()
+    unwatched: dict[str, str] = field(default_factory=dict)
 
     def overall(self) -> tuple[Assessment, ...]:
         """Return one assessment per target and method, over all its blocks."""

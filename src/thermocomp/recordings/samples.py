@@ -14,6 +14,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.core.inputs import Input
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.core.machine import Channel
+from thermocomp.core.starting import find_usual
 from thermocomp.core.zero import FIRST_READING, Zeroing, first_rows, mean_over_time
 from thermocomp.recordings.starts import Start
 
@@ -266,10 +267,7 @@ def _usual(zeros: FloatArray, own: BoolArray) -> FloatArray:
     if len(zeros) < 2 or not own.any():
         return np.asarray(np.median(zeros, axis=0))
     day = np.where(own, np.median(zeros[:, own], axis=1, keepdims=True), 0.0)
-    own_zeros = zeros - day
-    middle = np.abs(own_zeros - np.median(own_zeros, axis=0)).argmin(axis=0)  # no mean of two levels
-    usual = np.take_along_axis(own_zeros, middle[None], axis=0)[0]
-    return np.asarray(usual + np.median(day, axis=0))
+    return np.asarray(find_usual(zeros - day) + np.median(day, axis=0))
 
 
 def usual_step(step: FloatArray) -> float:

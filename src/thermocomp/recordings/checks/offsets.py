@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
+from thermocomp.core.starting import find_middle, find_usual
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
@@ -69,12 +70,8 @@ def _offsets(start: FloatArray) -> FloatArray:
     if not sound.any():
         return np.zeros(start.shape)
     change = np.where(sound, start - start[0], 0.0)
-    ordered, n = np.sort(change[:, sound], axis=1), int(sound.sum())
-    below, above = ordered[:, [(n - 1) // 2]], ordered[:, [n // 2]]
-    change -= np.where(np.abs(above) < np.abs(below), above, below)  # half of the sensors may be off together
-    middle = np.abs(change - np.median(change, axis=0)).argmin(axis=0)  # of two levels that of the first recording
-    usual = np.take_along_axis(change, middle[None], axis=0)
-    off = np.where(sound, change - usual, 0.0)
+    change -= np.array([find_middle(own) for own in change[:, sound].tolist()])[:, None]
+    off = np.where(sound, change - find_usual(change), 0.0)
     spread = 1.4826 * float(np.median(np.abs(off[:, sound])))
     off[np.abs(off) <= max(THRESHOLDS.start_reported, _USUAL * spread)] = 0.0
     off[(off != 0).sum(axis=1) > min(MOST, off.shape[1] / 2)] = 0.0
