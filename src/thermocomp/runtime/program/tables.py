@@ -10,6 +10,7 @@ from thermocomp.core.expression import Clip, Node
 from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.starting import find_start_span
 from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
@@ -204,7 +205,7 @@ def _ranges(
         "applies": [1 if h else 0 if r.quantity in plausible else 2 for h, r in zip(heat, ranges, strict=True)],
         "least": [low for low, _ in limits],
         "most": [high for _, high in limits],
-        "span": [max(r.high - r.low, thresholds.start_offset) for r in ranges],
+        "span": [find_start_span(r, thresholds) for r in ranges],
         "bound_low": [max(low for low, _ in bounds[r]) for r in ranges],
         "bound_high": [min(high for _, high in bounds[r]) for r in ranges],
         "waits": [r not in at_once for r in ranges],
