@@ -31,7 +31,7 @@ BASELINES = ("no compensation", "the learned mean", "the last learned value")
 #: baseline of a single section that continues the training data: both relative to the mean of its first rows
 REZEROED = "no compensation, both re-zeroed at the start of the block"
 CURVE = "the mean curve of the other cycles or files over time"
-SLOW = "no compensation, slow changes removed from both"
+SLOW = "no compensation (slow changes removed from both)"
 #: baselines that know the time
 OF_TIME = (CURVE, SLOW)
 REZERO_ROWS = 5

@@ -90,9 +90,10 @@ def cautions(comparison: Comparison) -> list[str]:
         found.append(
             f"the comparison was stopped: {comparison.left} combinations of method and target were not judged."
         )
-    for block, why in comparison.unwatched.items():
+    for why in dict.fromkeys(comparison.unwatched.values()):
+        blocks = _list([block for block, of in comparison.unwatched.items() if of == why])
         found.append(
-            f"no watch could be trained without {block}, so lost sensors are judged there as undetected: {why}"
+            f"no watch could be trained without {blocks}, so lost sensors are judged there as undetected: {why}"
         )
     loud = [(a, max(mean for mean, _ in r.noise_rms.values())) for a, r in known]
     loud = [(a, noisy) for a, noisy in loud if 2 * a.metric("rms") < noisy <= a.none_metric("rms")]
