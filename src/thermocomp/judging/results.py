@@ -192,7 +192,7 @@ class Assessment:
 
     @property
     def _fragile(self) -> str:
-        """Effect of noise or a lost sensor on a model that is accepted without them; empty if it is harmless."""
+        """Effect of disturbed readings on a model that is accepted without them; empty if it is harmless."""
         if self.robustness is None or not self.verdict.accepted:
             return ""
         margin = max(u.margin for u in self.verdict.units)  # a stated one applies to the judged errors only

@@ -1,4 +1,4 @@
-"""Effect of noise and of a lost sensor on a model."""
+"""Effect of noise, of a lost sensor and of undetected deviations on a model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,11 +10,14 @@ from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.size import Size
 from thermocomp.judging.guards import Guard
-from thermocomp.judging.replay import walk
+from thermocomp.judging.replay import Disturb, walk
 from thermocomp.recordings.samples import Samples
 
 #: amplitude of the noise on every temperature (C-33) [degC]
 NOISE = 0.4
+#: lasting deviation of a temperature, at most half its trained range, that no watch detects [degC]: heat from an axis
+#: that did not move in the recording, colder coolant, or a drift of the sensor
+OFF = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Robustness:
     together_rms : dict of str to float
         RMS with several sensors lost at once (``t1_C, t2_C``); used only to decide whether the model may then run
         [um].
+    deviating : dict of str to tuple of float
+        By temperature: lasting deviation that no watch detects [degC], and RMS with it [um].
     """
 
     noise: float
@@ -54,12 +59,14 @@ class Robustness:
     unlike: float = 0.0
     unlike_rms: float = float("nan")
     together_rms: dict[str, float] = field(default_factory=dict)
+    deviating: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def worse_than_none(self) -> tuple[str, ...]:
         """Disturbances under which the error of the model exceeds that without compensation, so that it does harm.
 
-        Examples: ``noise of 0.4 degC`` (the mean over the draws of one of its distributions) and ``loss of t3_C``.
+        Examples: ``noise of 0.4 degC`` (the mean over the draws of one of its distributions), ``loss of t3_C`` and
+        ``t3_C off by 1.2 degC``.
         """
         return tuple(self._above(self.none_rms))
 
@@ -77,10 +84,12 @@ class Robustness:
         )
 
     def _above(self, limit: float) -> dict[str, float]:
-        """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: noise, then losses, the worst first."""
+        """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: of a kind, the worst first."""
         loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
         lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
+        off = sorted(self.deviating.items(), key=lambda item: -item[1][1])
         found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
+        found |= {f"{name} off by {by:.2g} degC": rms for name, (by, rms) in off}
         return {what: rms for what, rms in found.items() if rms > limit}
 
     @property
@@ -88,9 +97,15 @@ class Robustness:
         """Sensor whose loss causes the largest error, and the RMS without it [um]."""
         return max(self.lost_rms.items(), key=lambda item: item[1], default=("", float("nan")))
 
+    @property
+    def worst_off(self) -> tuple[str, float]:
+        """Sensor whose undetected deviation causes the largest error, and the RMS with it [um]."""
+        found = ((name, rms) for name, (_, rms) in self.deviating.items())
+        return max(found, key=lambda item: item[1], default=("", float("nan")))
+
 
 def worse(one: Robustness, other: Robustness) -> Robustness:
-    """Return `one`, with the worse result of `one` and `other` for noise and each lost sensor."""
+    """Return `one`, with the worse result of `one` and `other` for each disturbance."""
     noise = {
         law: (max(mean, other.noise_rms[law][0]), max(largest, other.noise_rms[law][1]))
         for law, (mean, largest) in one.noise_rms.items()
@@ -99,7 +114,10 @@ def worse(one: Robustness, other: Robustness) -> Robustness:
         {n: max(a.get(n, 0.0), b.get(n, 0.0)) for n in dict.fromkeys((*a, *b))}
         for a, b in ((one.lost_rms, other.lost_rms), (one.together_rms, other.together_rms))
     )
-    return replace(one, noise_rms=noise, lost_rms=lost, together_rms=together)
+    off = dict(one.deviating)
+    for name, (by, rms) in other.deviating.items():
+        off[name] = max(off.get(name, (by, rms)), (by, rms), key=lambda found: found[1])
+    return replace(one, noise_rms=noise, lost_rms=lost, together_rms=together, deviating=off)
 
 
 def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustness | None:
@@ -137,6 +155,10 @@ def pool_robustness(parts: Sequence[tuple[Robustness | None, int]]) -> Robustnes
         },
         lost_rms=by_name([(r.lost_rms, n) for r, n in known]),
         together_rms=by_name([(r.together_rms, n) for r, n in known]),
+        deviating={
+            name: (max(r.deviating[name][0] for r, _ in known if name in r.deviating), rms)
+            for name, rms in by_name([({k: v for k, (_, v) in r.deviating.items()}, n) for r, n in known]).items()
+        },
         outside=sum(r.outside * n for r, n in known) / sum(rows),
         outside_rms=mean_square([v for v, _ in beyond], [w for _, w in beyond]),
         none_rms=mean_square([r.none_rms for r, _ in known], rows),
@@ -169,6 +191,8 @@ def stress(
       (E-C9), so both are drawn: uniform within +-`NOISE`, and normal with `NOISE` as standard deviation.
     - Each sensor lost: its change reads zero from the start (C-34), the worst kind of failure. With a guard, a
       watch may detect it; without, it goes undetected.
+    - Each temperature off by `OFF` once the zero is known. The deviation may have either sign: its effect is added to
+      the error as if uncorrelated with it.
 
     Parameters
     ----------
@@ -177,23 +201,66 @@ def stress(
     rows : ndarray of bool of shape (n_rows,)
         Rows to judge.
     """
-    temperatures = np.flatnonzero([i.quantity == "temperature" for i in model.inputs])
     lost: list[tuple[str, ...]] = [(i.name,) for i in model.inputs if i.name in model.sensors]
     lost += [names for names in (guard.readings if guard else ()) if len(names) > 1 and {*names} <= {*model.sensors}]
-    cut = [[k for k, i in enumerate(model.inputs) if i.name in names] for names in lost]
+    off = _find_undetected(model, samples)
+    disturb = _disturb(model, samples, draws, lost, guard, off)
+    # sums instead of a table: a long recording times two hundred variants would not fit into memory
+    predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
+    squares, done = np.zeros(1 + 2 * draws + len(lost) + len(off)), 0
+    for some in walk(model.merged(), samples, rows, disturb):
+        part = slice(done, done + len(some.rows))
+        error = measured[part, None] - some.deviation
+        error[:, len(squares) - len(off) :] -= error[:, :1]  # the effect alone
+        squares += (error**2).sum(axis=0)
+        predicted[part], beyond[part] = some.deviation[:, 0], some.outside[:, 0].any(axis=-1)
+        done = part.stop
+    squares[len(squares) - len(off) :] += squares[0]
+    rms = np.sqrt(squares / len(measured))
+    without, deviating = rms[1 + 2 * draws :][: len(lost)], rms[len(rms) - len(off) :]
+    laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
+    unlike = unlike_rows(model, samples, rows)
+    robustness = Robustness(
+        noise=NOISE,
+        noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
+        lost_rms={names[0]: float(v) for names, v in zip(lost, without, strict=True) if len(names) == 1},
+        together_rms={", ".join(n): float(v) for n, v in zip(lost, without, strict=True) if len(n) > 1},
+        deviating={name: (abs(by), float(v)) for (name, by), v in zip(off.items(), deviating, strict=True)},
+        outside=float(beyond.mean()),
+        outside_rms=Size.of((measured - predicted)[beyond]).rms,
+        none_rms=Size.of(measured).rms,
+        unlike=float(unlike.mean()),
+        unlike_rms=Size.of((measured - predicted)[unlike]).rms,
+    )
+    return Replayed(predicted, beyond, robustness)
+
+
+def _disturb(
+    model: ErrorModel,
+    samples: Samples,
+    draws: int,
+    lost: Sequence[tuple[str, ...]],
+    guard: Guard | None,
+    off: dict[str, float],
+) -> Disturb:
+    """Return what makes the variants of readings: undisturbed, with noise, with sensors lost, with sensors off."""
+    names = [i.name for i in model.inputs]
+    temperatures = np.flatnonzero([i.quantity == "temperature" for i in model.inputs])
+    cut = [[names.index(name) for name in of] for of in lost]
     known = [c.name for c in samples.inputs]
-    columns = {known.index(i.name): k for k, i in enumerate(model.inputs)}
+    columns = {known.index(name): k for k, name in enumerate(names)}
     let = [
-        {columns[c]: v for c, v in guard.readings.get(names, {}).items() if c in columns} if guard else {}
-        for names in lost
+        {columns[c]: v for c, v in guard.readings.get(of, {}).items() if c in columns} if guard else {} for of in lost
     ]
+    first = np.array([samples.time[samples.test == test].min() for test in range(len(samples.test_names))])
+    zeroed = samples.time > first[samples.test] + model.zeroing.at_rest
     rng = np.random.default_rng(0)
     adjacent = temperatures.size and temperatures[-1] - temperatures[0] + 1 == temperatures.size
     # a slice of adjacent columns is added to in place, in a third of the time
     heat = slice(temperatures[0], temperatures[-1] + 1) if adjacent else temperatures
 
     def disturb(rows: NDArray[np.intp], readings: FloatArray, reference: FloatArray) -> FloatArray:
-        batch = np.repeat(readings[:, None], 1 + 2 * draws + len(lost), axis=1)
+        batch = np.repeat(readings[:, None], 1 + 2 * draws + len(lost) + len(off), axis=1)
         noise = np.empty((2, draws, len(temperatures)))
         for own in batch:  # a row after the other: the noise of a row does not depend on those after it
             rng.random(out=noise[0])
@@ -207,31 +274,24 @@ def stress(
                     batch[:, variant, k] = values[rows]
             else:
                 batch[:, variant, places] = reference[places]
+        for variant, (name, by) in enumerate(off.items(), start=1 + 2 * draws + len(lost)):
+            batch[:, variant, names.index(name)] += by * zeroed[rows]
         return batch
 
-    # sums instead of a table: a long recording times two hundred variants would not fit into memory
-    predicted, beyond = np.empty(len(measured)), np.empty(len(measured), dtype=np.bool_)
-    squares, done = np.zeros(1 + 2 * draws + len(lost)), 0
-    for some in walk(model.merged(), samples, rows, disturb):
-        part = slice(done, done + len(some.rows))
-        squares += ((measured[part, None] - some.deviation) ** 2).sum(axis=0)
-        predicted[part], beyond[part] = some.deviation[:, 0], some.outside[:, 0].any(axis=-1)
-        done = part.stop
-    rms = np.sqrt(squares / len(measured))
-    laws = {"uniform": rms[1 : 1 + draws], "normal": rms[1 + draws : 1 + 2 * draws]}
-    unlike = unlike_rows(model, samples, rows)
-    robustness = Robustness(
-        noise=NOISE,
-        noise_rms={law: (float(v.mean()), float(v.max())) for law, v in laws.items() if v.size},
-        lost_rms={names[0]: float(v) for names, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(names) == 1},
-        together_rms={", ".join(n): float(v) for n, v in zip(lost, rms[1 + 2 * draws :], strict=True) if len(n) > 1},
-        outside=float(beyond.mean()),
-        outside_rms=Size.of((measured - predicted)[beyond]).rms,
-        none_rms=Size.of(measured).rms,
-        unlike=float(unlike.mean()),
-        unlike_rms=Size.of((measured - predicted)[unlike]).rms,
-    )
-    return Replayed(predicted, beyond, robustness)
+    return disturb
+
+
+def _find_undetected(model: ErrorModel, samples: Samples) -> dict[str, float]:
+    """Return a lasting deviation of each temperature that no watch detects [degC].
+
+    Its sign is towards the middle of the trained range, so that the support does not hide its effect.
+    """
+    usual = dict(zip((c.name for c in samples.inputs), np.nanmean(samples.change(), axis=0).tolist(), strict=True))
+    return {
+        i.name: float(np.copysign(min(OFF, (i.high - i.low) / 2), (i.low + i.high) / 2 - usual[i.name]))
+        for i in model.inputs
+        if i.quantity == "temperature"
+    }
 
 
 def unlike_rows(model: ErrorModel, samples: Samples, rows: BoolArray) -> BoolArray:

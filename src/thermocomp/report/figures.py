@@ -153,7 +153,7 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
 
 
 def robustness(comparison: Comparison, model: str) -> Drawn:
-    """Plot the effect of noise and of a lost sensor: RMS undisturbed, with noise, and with each sensor lost."""
+    """Plot the RMS undisturbed, with noise, with each sensor lost, and with each off without being detected."""
     found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
     with drawing("robustness" + model):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
@@ -163,6 +163,8 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
             assert r is not None
             lost = list(r.lost_rms.values())
             ax.plot(lost, [k] * len(lost), "|", color=RESIDUAL, ms=11, mew=1.3)
+            off = [rms for _, rms in r.deviating.values()]
+            ax.plot(off, [k] * len(off), "x", color=COLOURS[3], ms=4, mew=1.0)
             for law, marker in (("uniform", "s"), ("normal", "D")):
                 ax.plot(r.noise_rms[law][0], k, marker, color=COLOURS[2], mfc="white", ms=6, zorder=3)
             ax.plot(a.metric("rms"), k, "o", color=PREDICTED, ms=6, zorder=4)
@@ -183,6 +185,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
         ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
         ax.plot([], [], "|", color=RESIDUAL, label="one sensor lost")
+        ax.plot([], [], "x", color=COLOURS[3], ms=4, label="one sensor off, undetected")
         ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
         log_ticks(ax, "x")
         name_ticks(ax.yaxis, [a.target for a in found])

@@ -116,7 +116,7 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
 
 def _disturbed(target: str, found: Robustness) -> Iterator[PrintedLine]:
     if found.harm:
-        yield PrintedLine(f" {target}: {found.harm}", Toned("harmful with noise or a lost sensor", "bad"))
+        yield PrintedLine(f" {target}: {found.harm}", Toned("harmful with disturbed readings", "bad"))
     if found.outside > 0.1:
         yield PrintedLine(f" {100 * found.outside:.0f} % of the rows are outside the trained range of {target}", BUT)
     if found.unlike > 0.1:
@@ -140,6 +140,7 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
         Column("uniform noise", "uniform", ".2f"),
         Column("normal noise", "normal", ".2f"),
         Column("worst lost sensor", "lost", ">"),
+        Column("worst sensor off", "off", ">"),
         Column("rows outside range", "outside", ">"),
     )
     rows = [
@@ -148,6 +149,7 @@ def _robustness(assessments: Sequence[Assessment]) -> Layout:
             "clean": a.undisturbed,
             **{law: mean for law, (mean, _) in a.robustness.noise_rms.items()},
             "lost": "{1:.2f} ({0})".format(*a.robustness.worst_lost),
+            "off": "{1:.2f} ({0})".format(*a.robustness.worst_off) if a.robustness.deviating else "",
             "outside": f"{100 * a.robustness.outside:.1f} %",
         }
         for a in assessments

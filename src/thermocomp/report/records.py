@@ -136,6 +136,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
             "noise_degC": r.noise,
             "noise_rms_um": {law: {"mean": mean, "max": top} for law, (mean, top) in r.noise_rms.items()},
             "lost_sensor_rms_um": r.lost_rms,
+            "undetected_deviations": {n: {"deviation_degC": by, "rms_um": v} for n, (by, v) in r.deviating.items()},
             "worse_than_none": list(r.worse_than_none),
             "unlike_training_pct": 100 * r.unlike,
             "unlike_training_rms_um": r.unlike_rms,

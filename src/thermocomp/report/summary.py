@@ -82,7 +82,7 @@ def verdict(comparison: Comparison) -> str:
 
 
 def cautions(comparison: Comparison) -> list[str]:
-    """Return cautions not contained in the verdict: noise, lost sensors, readings outside the training range."""
+    """Return cautions not contained in the verdict: noise, disturbed readings, readings outside the training range."""
     best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
     known = [(a, a.robustness) for a in best if a.robustness is not None]
     found = []
@@ -114,7 +114,7 @@ def cautions(comparison: Comparison) -> list[str]:
 
 
 def harms(comparison: Comparison) -> list[str]:
-    """Return usable models that noise or a lost sensor makes worse than no compensation, but within the margin.
+    """Return usable models that disturbed readings make worse than no compensation, but within the margin.
 
     Beyond the margin a model is unproven, with this as its reason.
     """
