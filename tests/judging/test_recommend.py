@@ -58,6 +58,24 @@ def test_the_recommended_method_is_judged_with_its_choosing() -> None:
     assert "3 methods tried, selected again in each fold" in best.reason
 
 
+def test_without_a_recommendation_the_method_least_disturbed_by_noise_is_used() -> None:
+    """The smallest error on quiet readings may belong to the method with the largest effects of single sensors."""
+    samples = of(small_machine(SIX))
+    result = compare(samples, ["ols", "dynamic"], splits.leave_one_cycle_out(samples), rules=Rules(primary="ols"))
+    found = {a.model: a for a in result.overall()}
+    assert all(a.accepted for a in found.values())
+    assert found["dynamic"].metric("rms") < found["ols"].metric("rms")
+    for share, method in ((0.9, "dynamic"), (1.1, "ols")):
+        a, mine = found["dynamic"], found["ols"].noisy_rms * share
+        assert a.robustness is not None
+        noisy = replace(
+            a, robustness=replace(a.robustness, noise_rms=dict.fromkeys(("uniform", "normal"), (mine, mine)))
+        )
+        best = replace(result, assessments=(found["ols"], noisy)).best("z_um")
+        assert best is not None
+        assert best.model == method
+
+
 def test_one_that_is_named_beforehand_is_not_corrected() -> None:
     samples = of(small_machine(SIX))
     judging = splits.leave_one_cycle_out(samples)

@@ -167,6 +167,11 @@ class Assessment:
             return self.unprobed_metric("rms")
         return metrics.METRICS["rms"](self.measured, self.alone)
 
+    @property
+    def noisy_rms(self) -> float:
+        """RMS with noise on every temperature; without, if its effect was not tested [um]."""
+        return self.metric("rms") if self.robustness is None else self.robustness.noisy_rms
+
     def held_metric(self, name: str) -> float:
         """Return a metric for compensation by probings alone, each held until the next; without probings, for none."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
@@ -251,8 +256,9 @@ class Comparison:
     def best(self, target: str) -> Assessment | None:
         """Return the assessment of the method to be used for a target: the recommended one if it was accepted.
 
-        Otherwise the accepted method with the smallest RMS that can be deployed; None if there is none.
+        Otherwise the accepted method with the smallest RMS with noisy temperatures that can be deployed; None if there
+        is none.
         """
         fit = [a for a in self.overall() if a.target == target and a.accepted and a.deployable]
         first = {r.method for r in self.recommended if r.target == target}
-        return min(fit, key=lambda a: (a.model not in first, a.metric("rms")), default=None)
+        return min(fit, key=lambda a: (a.model not in first, a.noisy_rms), default=None)

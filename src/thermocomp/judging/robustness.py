@@ -85,12 +85,16 @@ class Robustness:
 
     def _above(self, limit: float) -> dict[str, float]:
         """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: of a kind, the worst first."""
-        loud = max((mean for mean, _ in self.noise_rms.values()), default=0.0)
         lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
         off = sorted(self.deviating.items(), key=lambda item: -item[1][1])
-        found = {f"noise of {self.noise:g} degC": loud} | {f"loss of {name}": rms for name, rms in lost}
+        found = {f"noise of {self.noise:g} degC": self.noisy_rms} | {f"loss of {name}": rms for name, rms in lost}
         found |= {f"{name} off by {by:.2g} degC": rms for name, (by, rms) in off}
         return {what: rms for what, rms in found.items() if rms > limit}
+
+    @property
+    def noisy_rms(self) -> float:
+        """Mean RMS over the draws of the noise, for the distribution with the larger one [um]."""
+        return max((mean for mean, _ in self.noise_rms.values()), default=0.0)
 
     @property
     def worst_lost(self) -> tuple[str, float]:

@@ -95,7 +95,7 @@ def cautions(comparison: Comparison) -> list[str]:
         found.append(
             f"no watch could be trained without {blocks}, so lost sensors are judged there as undetected: {why}"
         )
-    loud = [(a, max(mean for mean, _ in r.noise_rms.values())) for a, r in known]
+    loud = [(a, r.noisy_rms) for a, r in known]
     loud = [(a, noisy) for a, noisy in loud if 2 * a.metric("rms") < noisy <= a.none_metric("rms")]
     if loud:
         text = _list([f"{a.target} from {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
