@@ -150,7 +150,8 @@ def _of_version_4(entry: dict[str, Any]) -> dict[str, Any]:
     for k, watch in enumerate(watches):
         fault = decode(NDArray[np.int8], watch.get("fault"), f"state.watches.{k}.fault")
         order = np.broadcast_to(np.arange(fault.shape[-1], dtype=np.int16), fault.shape)
-        found.append(watch | {"fault": encode(np.where(fault == SWAPPED, UNEXPLAINED, fault)), "order": encode(order)})
+        told = watch | {"fault": encode(np.where(fault == SWAPPED, UNEXPLAINED, fault)), "order": encode(order)}
+        found.append(dict(sorted(told.items(), key=lambda item: WatchState._fields.index(item[0]))))
     return entry | {"watches": found}
 
 

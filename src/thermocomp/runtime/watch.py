@@ -287,9 +287,10 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
         wait = np.where(missing, watch.thresholds.return_time, watch.thresholds.fault_rest)
         again = fits & (s.time - back >= wait)
+    fault = np.where(again, trust(s.order), s.fault).astype(np.int8)
     return s._replace(
-        fault=np.where(again, trust(s.order), s.fault).astype(np.int8),
-        since=np.where(again, np.nan, s.since),
+        fault=fault,
+        since=np.where(fault == GOOD, np.nan, s.since),
         usual=np.where(again, difference, s.usual),
         used=np.where(again, s.predicted + difference, s.used),
         same=np.where(again, np.nan, s.same),

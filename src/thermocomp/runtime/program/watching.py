@@ -68,6 +68,7 @@ def pass_on(s: Kept, w: Work, t: Constants) -> None:
         heating.trust_speeds(s, w, t)
     with when(w.now - s.look >= t.check_interval):
         look(s, w, t)
+        read_sensors(s, w, t)
         with when(t.supervised):
             heating.trust_speeds(s, w, t)
     for i in each("i", t.SENSORS):
@@ -76,6 +77,7 @@ def pass_on(s: Kept, w: Work, t: Constants) -> None:
             w.given[t.sensor_channel[i]] = True
         with otherwise_when(s.order[i].differs(i)):
             w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + w.x[i]
+            w.given[t.sensor_channel[i]] = True
 
 
 @procedure
