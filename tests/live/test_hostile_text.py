@@ -210,6 +210,7 @@ def test_names_without_end_are_counted_and_cost_nothing(tmp_path: Path) -> None:
 def test_events_are_not_drowned(tmp_path: Path) -> None:
     with floor(tmp_path) as shop:
         shop.publish([])
+        shop.until(lambda: "z_um" in shop.service.state.raw)
         shop.service.rezero("z_um", "a new part")
         for k in range(5):
             many: list[Message] = [("m/7", b"{")] * 100
