@@ -29,8 +29,7 @@ from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.watch import look
-from thermocomp.runtime.watchstate import begin
+from thermocomp.runtime.watch import begin, look
 from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]

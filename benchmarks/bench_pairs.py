@@ -23,8 +23,7 @@ from thermocomp.core.provenance import HonestError
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
-from thermocomp.runtime.watch import look
-from thermocomp.runtime.watchstate import begin
+from thermocomp.runtime.watch import GOOD, begin, look
 
 #: goals: ratio to the error without a watch, or excess over it [um]; ratio to that with all sensors; share of pairs
 RATIO, EXCESS, SOUND = 1.05, 0.1, 2.0
@@ -69,7 +68,7 @@ def pairs(samples: Samples, cycle: int) -> Iterator[Pair]:
     for k in range(stop):
         state, let = look(watch, state, float(samples.time[k]), given[k][:, columns], resting=bool(samples.stands[k]))
         passed[k][:, columns] = let
-        faults[k] = ~state.trusted
+        faults[k] = state.fault != GOOD
     for k, target in enumerate(TARGETS):
         model, errors = train("averaged", samples, k, learn).model, honest[target]
         well = left(model, samples, passed[:, 0], k)

@@ -28,8 +28,7 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime import batch
 from thermocomp.runtime.limits import fade
-from thermocomp.runtime.watch import look
-from thermocomp.runtime.watchstate import GOOD, begin
+from thermocomp.runtime.watch import GOOD, begin, look
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -22,7 +22,7 @@ from thermocomp.recordings.starts import Start
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.watchstate import GOOD
+from thermocomp.runtime.watch import GOOD
 from thermocomp.virtual import datasets as virtual
 
 
@@ -96,25 +96,6 @@ def test_a_correction_that_does_harm_is_held_then_fades(model: ErrorModel) -> No
     assert whole.alone is not None
     assert after.rms > 2 * rms(measured[later], whole.alone[later])  # it would have gone on with what stands in
     assert after.none_rms == pytest.approx(rms(measured[later], np.zeros(later.sum())))
-
-
-@pytest.mark.parametrize("pair", [("t1_C", "t2_C"), ("t1_C", "t3_C"), ("t2_C", "t3_C")])
-def test_swapped_sensors_are_reported_and_not_lost(model: ErrorModel, pair: tuple[str, str]) -> None:
-    """The model must not run without t3_C; of two swapped, each takes the reading of the other."""
-    day = failing()
-    rise = {name: day.table[name] - day.table[name].iloc[:6].mean() for name in pair}
-    there = {one: day.table[one] - rise[one] + rise[other] for one, other in (pair, pair[::-1])}
-    recording = replace(day, table=day.table.assign(**there))
-    judged = assessing.assess([model], [recording], starts=Start())
-    (log,) = find_faults(judged, [recording])
-    assert {(f.sensor, f.word) for f in log.faults} == {(name, "swapped") for name in pair}
-    failed, said, held = live(model, recording)
-    assert failed[-1] == dict.fromkeys(pair, "swapped")
-    assert not any(held)
-    (cost,) = find_costs(model, judged.overall()[0], [log])
-    assert cost.failed == ()
-    sound, later = live(model, day)[1], day.time > log.faults[0].begin + 3 * 3600.0  # the model remembers
-    assert said[later] == pytest.approx(sound[later], abs=0.3)
 
 
 def test_several_lost_are_told_apart(model: ErrorModel) -> None:

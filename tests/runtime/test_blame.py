@@ -12,8 +12,7 @@ from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.runtime.watch import look
-from thermocomp.runtime.watchstate import GOOD, MISSING, SWAPPED, UNEXPLAINED, begin
+from thermocomp.runtime.watch import GOOD, MISSING, SWAPPED, UNEXPLAINED, begin, look
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]
@@ -78,34 +77,17 @@ def test_every_pair_is_named_once_its_responses_differ(watch: Watch, samples: Sa
     assert named >= differ - 1 >= 12
 
 
-def test_each_of_the_two_takes_the_reading_of_the_other(watch: Watch, samples: Samples) -> None:
+def test_what_stands_in_for_the_two_is_nearer_than_they_were(watch: Watch, samples: Samples) -> None:
     values = swapped(samples)
     found, when, through = run(watch, samples, values)
-    for k in range(1, 1 + len(PAIRS)):
-        if (found[k] == SWAPPED).any():
-            after = samples.time >= when[k].min()
-            assert np.abs(through[after, k] - samples.values[after]).max() < 1e-9
-            assert np.array_equal(through[~after, k], values[~after, k])
-    assert (found == SWAPPED).sum() >= 24
-
-
-def test_one_of_the_two_may_be_missing_for_a_while(watch: Watch, samples: Samples) -> None:
-    """The reading of the other is then missing at its terminals; later each takes the other's reading again."""
     k = 1 + PAIRS.index((0, 4))
-    values = swapped(samples)[:, k : k + 1]
-    _, when, _ = run(watch, samples, values)
-    gone = (samples.time > when[0, 0] + 3600.0) & (samples.time <= when[0, 0] + 2 * 3600.0)
-    values[gone, 0, 4] = np.nan
-    state, through, faults = begin(watch, runs=(1,)), np.empty_like(values), np.zeros((len(values), len(SIX)), int)
-    for row, time in enumerate(samples.time.tolist()):
-        state, through[row] = look(watch, state, time, values[row], resting=bool(samples.stands[row]))
-        faults[row] = state.fault[0]
-    assert (faults[gone, 0] == MISSING).all()
-    assert (faults[gone, 4] == SWAPPED).all()
-    assert np.abs(through[gone, 0, 4] - samples.values[gone, 4]).max() < 1e-9
-    assert np.abs(through[gone, 0, 0] - samples.values[gone, 0]).max() < 3.0  # its prediction
-    assert faults[-1].tolist() == [SWAPPED, 0, 0, 0, SWAPPED, 0]
-    assert np.abs(through[-1, 0] - samples.values[-1]).max() < 1e-9
+    after = samples.time >= when[k, 0] + 3600.0
+    for sensor in (0, 4):
+        assert found[k, sensor] == SWAPPED
+        left = np.sqrt(np.mean((through[after, k, sensor] - samples.values[after, sensor]) ** 2))
+        assert left < 0.35 * np.sqrt(np.mean((values[after, k, sensor] - samples.values[after, sensor]) ** 2))
+    others = [c for c in range(values.shape[2]) if c not in (0, 4)]
+    assert np.array_equal(through[:, k][:, others], values[:, k][:, others])
 
 
 def test_absolute_temperatures_are_exchanged_as_they_are(samples: Samples) -> None:

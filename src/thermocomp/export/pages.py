@@ -9,10 +9,10 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
     slopes = any(tables.values["to_slope"])
     zeroing = compensator.models[0].zeroing
     sensors = (
-        "\n\nThe temperature sensors are monitored: a sensor that is missing, stuck or stepped, or whose "
+        "\n\nThe temperature sensors are monitored: a sensor that is missing, stuck, stepped or swapped, or whose "
         "deviation from its prediction is unexplained, is replaced by its prediction from the others, if the model "
-        "was judged without it; otherwise the correction is held, then fades. Two that are swapped take each other's "
-        f"readings. `{of}fault[k]`, of {', '.join(tables.sensors)}: 0 good, 1 "
+        "was judged without it; "
+        f"otherwise the correction is held, then fades. `{of}fault[k]`, of {', '.join(tables.sensors)}: 0 good, 1 "
         "missing, 2 stepped, 3 stuck, 4 off, 5 swapped, 6 unexplained."
         if tables.sensors
         else "\n\nThe temperature sensors are not monitored: an implausible value stops the correction; a plausible "

@@ -20,7 +20,7 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.watchstate import WORDS
+from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -51,7 +51,7 @@ class Answers(NamedTuple):
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
     status: IntArray  #: (n_calls, n_targets), index into `STATUS`
     deviation: FloatArray  #: (n_calls, n_models)
-    fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watchstate.WORDS`
+    fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watch.WORDS`
     passed: NDArray[np.bool_]  #: (n_calls,), whether the reading was used
 
 

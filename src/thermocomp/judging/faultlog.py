@@ -17,7 +17,7 @@ from thermocomp.judging.results import Assessment
 from thermocomp.judging.watched import can_look, look_through, stack_watched
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.runtime.watchstate import GOOD, MISSING, WORDS, lost_of
+from thermocomp.runtime.watch import GOOD, MISSING, WORDS
 
 IntArray = NDArray[np.int8]
 
@@ -26,7 +26,7 @@ class Fault(NamedTuple):
     """A period in which a sensor was not trusted."""
 
     sensor: str
-    word: str  #: see `thermocomp.runtime.watchstate.WORDS`
+    word: str  #: see `thermocomp.runtime.watch.WORDS`
     begin: float  #: time of detection, on the clock of its recording [s]
     end: float  #: time when it was trusted again, or end of the recording [s]
     returned: bool  #: whether it was trusted again
@@ -47,7 +47,7 @@ class FaultLog:
     watch : Watch
         Watch that detected the faults.
     fault : ndarray of int of shape (n_rows, n_sensors)
-        See `thermocomp.runtime.watchstate.WORDS`.
+        See `thermocomp.runtime.watch.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
         Recorded and replacement values [their units]; nan where there was none, or the sensor was trusted.
     faults : tuple of Fault
@@ -177,6 +177,6 @@ def _lost(model: ErrorModel, log: FaultLog) -> list[tuple[tuple[str, ...], bool]
     cases, which = np.unique(faults, axis=0, return_inverse=True)
     found = list[tuple[tuple[str, ...], bool]]()
     for case in cases.tolist():
-        failed = lost_of({n: WORDS[fault] for n, fault in zip(own, case, strict=True) if fault != GOOD})
+        failed = {n: WORDS[fault] for n, fault in zip(own, case, strict=True) if fault != GOOD}
         found.append((tuple(failed), not failed or (model.may_lose(failed) and not model.wrong_speeds(failed))))
     return [found[k] for k in which.ravel().tolist()]

@@ -14,7 +14,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
-from thermocomp.runtime.watchstate import WORDS, lost_of
+from thermocomp.runtime.watch import WORDS
 
 
 def believe(
@@ -41,12 +41,11 @@ def believe(
     known = [i.name in names for i in watch.inputs]
     places = [names.index(i.name) for i in watch.inputs if i.name in names]
     for test in np.unique(samples.test[rows]).tolist():
-        mine, passed, seen_faults = look_through(watch, seen, test)
+        mine, passed, faults = look_through(watch, seen, test)
         values[mine[:, None], places] = passed[:, known]
-        cases, which = np.unique(seen_faults, axis=0, return_inverse=True)
+        cases, which = np.unique(faults, axis=0, return_inverse=True)
         for case, found in enumerate(cases.tolist()):
-            faults = {n: WORDS[f] for n, f in zip(watch.failing, found, strict=True) if f and n in model.sensors}
-            failed = lost_of(faults)
+            failed = {n: WORDS[f] for n, f in zip(watch.failing, found, strict=True) if f and n in model.sensors}
             if failed:
                 runs_on = model.may_lose(failed) and not model.wrong_speeds(failed)
                 widening[mine[which.ravel() == case]] = model.widening(failed) if runs_on else np.inf
@@ -82,7 +81,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> tuple[NDArray[np.
     passed : ndarray of shape (n_rows, n_inputs)
         Readings passed on, in the order of the watch's inputs.
     faults : ndarray of int of shape (n_rows, n_sensors)
-        See `thermocomp.runtime.watchstate.WORDS`.
+        See `thermocomp.runtime.watch.WORDS`.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]

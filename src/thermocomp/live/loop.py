@@ -28,7 +28,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
-from thermocomp.runtime.watchstate import UNSURE, lost_of
+from thermocomp.runtime.watch import UNSURE
 
 #: values that are older than those used by more than this are reported [s of real time]
 BEHIND = 2.0
@@ -362,8 +362,7 @@ class Service:
         for name, fault in said.failed.items():
             if before is None or before.failed.get(name) != fault:
                 cause = " (a drift, or heat that the training did not contain)" if fault == UNSURE else ""
-                instead = "its prediction from the other sensors" if lost_of({name: fault}) else "that of the other one"
-                self.say("sensor", f"{name} {fault}{cause}: its reading is replaced by {instead}")
+                self.say("sensor", f"{name} {fault}{cause}: it is replaced by its prediction from the other sensors")
         for name in (before.failed if before else {}).keys() - said.failed.keys():
             self.say("sensor", f"{name} is used again")
         for target in probings:

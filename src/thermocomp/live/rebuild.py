@@ -15,7 +15,7 @@ from thermocomp.live.journal.journalreader import JournalReader
 from thermocomp.live.storedzero import StateOfOthers, StoredZero
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import CompensatorState, Reference
-from thermocomp.runtime.watchstate import begin
+from thermocomp.runtime.watch import begin
 
 #: after this multiple of its time constant, a slow state no longer depends on its first value
 FORGOTTEN = 5.0

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AwareDatetime
 
 from thermocomp.core.arrays import FloatArray
@@ -23,9 +22,9 @@ from thermocomp.live.storedzero import StateOfOthers, StoredZero, decode_zero, z
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.state import CompensatorState
-from thermocomp.runtime.watchstate import SWAPPED, UNEXPLAINED, WORDS, WatchState
+from thermocomp.runtime.watch import WORDS, WatchState
 
-KIND = jsonfile.Format("thermocomp-state", 5, "state file", "thermocomp serve")
+KIND = jsonfile.Format("thermocomp-state", 4, "state file", "thermocomp serve")
 
 
 #: maximum magnitude of an error [um]
@@ -104,7 +103,6 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
     try:
         entry = _of_version_1(stored.state) if content.version == 1 else stored.state
         entry = _of_version_3(entry) if content.version <= 3 else entry
-        entry = _of_version_4(entry) if content.version <= 4 else entry
         state = decode(CompensatorState, entry, "state")
         _check(state, compensator)
     except (ValueError, InputError) as e:
@@ -139,20 +137,6 @@ def _of_version_3(entry: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(learned, dict) or not all(isinstance(a, dict) for a in learned.values()):
         return entry
     return entry | {"learned": {t: {n: v for n, v in a.items() if n != "spread"} for t, a in learned.items()}}
-
-
-def _of_version_4(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return a state in which swapped sensors, replaced by their predictions then, are unexplained."""
-    watches = entry.get("watches")
-    if not isinstance(watches, list) or not all(isinstance(w, dict) for w in watches):
-        return entry
-    found = list[dict[str, Any]]()
-    for k, watch in enumerate(watches):
-        fault = decode(NDArray[np.int8], watch.get("fault"), f"state.watches.{k}.fault")
-        order = np.broadcast_to(np.arange(fault.shape[-1], dtype=np.int16), fault.shape)
-        told = watch | {"fault": encode(np.where(fault == SWAPPED, UNEXPLAINED, fault)), "order": encode(order)}
-        found.append(dict(sorted(told.items(), key=lambda item: WatchState._fields.index(item[0]))))
-    return entry | {"watches": found}
 
 
 def _watch_of_version_1(entry: Any, place: str) -> Any:
@@ -281,10 +265,6 @@ def _check_watch(seen: WatchState, first: WatchState, n: int, place: str) -> Non
     want(bool(np.isfinite(seen.since[seen.fault > 0]).all()), None, f"{place}.since", "the time of each failure")
     faults = np.append(seen.fault, seen.heat.fault)
     want(bool(((faults >= 0) & (faults < len(WORDS))).all()), None, f"{place}.fault", "a known fault")
-    own = np.arange(seen.order.size)
-    want(np.array_equal(np.sort(seen.order), own), None, f"{place}.order", "each sensor once")
-    taken = bool((seen.order[seen.fault == SWAPPED] != own[seen.fault == SWAPPED]).all())
-    want(taken, None, f"{place}.order", "another sensor for each that is swapped")
     _check_averaged(seen.averaged, n, f"{place}.averaged")
 
 

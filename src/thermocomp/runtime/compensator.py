@@ -42,7 +42,7 @@ from thermocomp.runtime.identity import remember, sift
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import NO_ZERO, Compensated, CompensatorState, Reference, Status
-from thermocomp.runtime.watchstate import WatchState, begin, lost_of
+from thermocomp.runtime.watch import WatchState, begin
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +263,7 @@ class Compensator:
         travel = travel_time(state, tick, self.limits)
         stepped = advance(self.groups, state.models, state.averaged, reading, instant.time, dt)
         failed = Lookout.failed(self._lookouts, state.watches)
-        done = self._drive(state, stepped, (reading.time, instant.time), fresh, lost_of(failed), travel)
+        done = self._drive(state, stepped, (reading.time, instant.time), fresh, failed, travel)
         left = rest(state, done.corrections, tick, self.lines, self.limits, done.held, driven=done.states)
         probed = {t: fresh[t] for t in done.moved}
         new = state._replace(

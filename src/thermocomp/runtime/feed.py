@@ -17,7 +17,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.gate import is_number
-from thermocomp.runtime.watchstate import WatchState
+from thermocomp.runtime.watch import GOOD, WatchState
 
 #: stands for a temperature without a value; larger numbers are none
 NONE, LARGEST = 1e13, 1e12
@@ -135,7 +135,7 @@ class TemperatureFeed:
         for watch, state, before, places in of:
             moved, steps = state.predicted - before, np.array([feed.steps[p] for p in places])
             least = np.maximum(watch.limits("frozen"), self._thresholds.repeat_moved * steps)
-            far = state.trusted & (np.abs(moved) > least)
+            far = (state.fault == GOOD) & (np.abs(moved) > least)
             if far.any():
                 k = int(np.argmax(far))
                 feed = feed._replace(moved=f"{watch.names[k]} should have changed by {moved[k]:+.2f} degC")

@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
-#: faults of a speed, as in `thermocomp.runtime.watchstate.WORDS`
+#: faults of a speed, as in `thermocomp.runtime.watch.WORDS`
 GOOD, MISSING, OFF = 0, 1, 4
 
 _EMPTY: FloatArray = np.empty(0)
@@ -36,7 +36,7 @@ class HeatState(NamedTuple):
     doubt: FloatArray = _EMPTY  #: (..., n_checks), start of one that cutting may explain; nan: none [s]
     gone: FloatArray = _EMPTY  #: (..., n_speeds), time at which a speed was first missing [s]
     back: FloatArray = _EMPTY  #: (..., n_speeds), time since which a failed speed agrees; nan: it does not [s]
-    fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watchstate.WORDS`
+    fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watch.WORDS`
 
 
 def begin(watch: Watch, runs: tuple[int, ...] = ()) -> HeatState:
@@ -108,7 +108,7 @@ def check(
     used : ndarray of shape (..., n_sensors)
         Temperatures minus their reference, with substitutes [degC].
     memory : ndarray of shape (..., n_memory)
-        See `thermocomp.runtime.watchstate.WatchState`.
+        See `thermocomp.runtime.watch.WatchState`.
     times : tuple of float
         Time, and time since the last check [s].
     failed : ndarray of bool of shape (..., n_sensors)

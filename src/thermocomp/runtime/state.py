@@ -13,7 +13,7 @@ from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.feed import FeedState
-from thermocomp.runtime.watchstate import WatchState
+from thermocomp.runtime.watch import WatchState
 
 Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "no zero", "unknown", "first start"]
 #: order of a target whose models have no valid zero: its correction is held until it is re-zeroed
@@ -73,7 +73,7 @@ class Compensated(NamedTuple):
     corrections: dict[str, Correction]  #: corrections in force after this reading, by target or axis
     rejected: str  #: reason why the gate rejected the reading; empty if accepted
     outside: tuple[str, ...]  #: inputs outside the trained range of a model
-    failed: dict[str, str]  #: sensors not trusted, with the kind of fault: see `thermocomp.runtime.watchstate`
+    failed: dict[str, str]  #: sensors not trusted, with the kind of fault: see `thermocomp.runtime.watch`
     states: dict[str, Status]  #: status of each target or axis
     deviations: dict[str, Deviation]  #: outputs of the models, adapted by probings
     half_widths: dict[str, float]  #: of the uncertainty bands, by target or axis with a band [um]

@@ -5,9 +5,10 @@ used. A missing sensor is replaced immediately by its prediction from the other 
 jumped, is stuck or deviates, as soon as this is certain. A substitute starts at the last value of the sensor and moves
 to the prediction, so that there is no jump. A missing sensor is trusted again when it agrees with its prediction. So is
 one with an unexplained deviation, which may be due to heat near it that the training did not contain, as of a moving
-axis. Two sensors that are swapped for certain take each other's readings. Other failed sensors are not trusted until a
-restart, since they must be repaired.
+axis. Other failed sensors are not trusted until a restart, since they must be repaired.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,96 @@ from thermocomp.core.watch import Watch
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime import heat
 from thermocomp.runtime.blame import find_limits, one_fails, speeds_fail, weigh_swaps
-from thermocomp.runtime.exchange import exchange, find_rises, trust
+from thermocomp.runtime.heat import HeatState
 from thermocomp.runtime.plausible import is_plausible, replace_first
-from thermocomp.runtime.watchstate import GOOD, MISSING, STEPPED, STUCK, UNEXPLAINED, WatchState
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int8]
+
+#: states of a sensor, by `WatchState.fault`
+WORDS = ("good", "missing", "stepped", "stuck", "off", "swapped", "unexplained")
+GOOD, MISSING, STEPPED, STUCK, OFF, SWAPPED, UNEXPLAINED = range(len(WORDS))
+#: no failure of a sensor for certain
+UNSURE = WORDS[UNEXPLAINED]
+
+
+class WatchState(NamedTuple):
+    """State of the watch between two readings; arrays are (..., n_sensors) unless noted otherwise."""
+
+    reference: FloatArray  #: (..., n_inputs), zero; nan while unknown
+    averaged: ZeroMean  #: mean of the readings of an unknown zero
+    time: float  #: of the last check; nan before the first [s]
+    memory: FloatArray  #: (..., n_memory), of the predictions
+    traces: FloatArray  #: (..., n_lags * n_sensors), lags of the differences: effect of a failure on `memory`
+    used: FloatArray  #: values used, minus the reference [degC]
+    predicted: FloatArray  #: minus the reference [degC]
+    usual: FloatArray  #: difference between reading and prediction, low-passed [degC]
+    fault: IntArray  #: see `WORDS`
+    since: FloatArray  #: time at which the fault was found [s]
+    bridge: FloatArray  #: offset of the substitute from the prediction, fading from `since` [degC]
+    jumped: FloatArray  #: time of a jump; nan: none [s]
+    off: FloatArray  #: start of a deviation; nan: none [s]
+    same: FloatArray  #: constant reading since `still` [degC]
+    still: FloatArray  #: start of the constant reading [s]
+    then: FloatArray  #: prediction at that time [degC]
+    moving: FloatArray  #: time since which its prediction has moved too far for a constant reading; nan: it has not [s]
+    back: FloatArray  #: time since which one that may return agrees with its prediction; nan: it does not [s]
+    evidence: FloatArray  #: (..., n_pairs), low-passed evidence that two are swapped; -inf: excluded
+    fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
+    heat: HeatState = HeatState()  #: supervision of the speeds
+
+    @property
+    def sound(self) -> bool:
+        """True if no input has failed, without the cost of `faults`."""
+        return not (np.count_nonzero(self.fault) or np.count_nonzero(self.heat.fault))
+
+    def faults(self, watch: Watch) -> IntArray:
+        """Return the faults of the inputs that can fail, (..., n_failing): temperatures, then supervised speeds."""
+        return (
+            np.concatenate([self.fault, self.heat.fault[..., watch.deciding >= 0]], axis=-1)
+            if watch.checks
+            else self.fault
+        )
+
+
+def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ...] = ()) -> WatchState:
+    """Return the state of a watch before the first reading.
+
+    Parameters
+    ----------
+    reference : ndarray of shape (n_inputs,), optional
+        Zero of the inputs; default: determined by the first readings for inputs with ``rezero``.
+    """
+    zero = np.array([np.nan if i.rezero else i.reference for i in watch.inputs])
+    zero = np.broadcast_to(zero if reference is None else reference, (*runs, len(watch.inputs))).copy()
+    n, bank = (*runs, len(watch.sensors)), watch.bank
+    nan, none = np.full(n, np.nan), np.zeros(n)
+    memory = np.zeros((*runs, len(bank.rates)))
+    traces = np.zeros((*runs, len(watch.time_constants) * len(watch.sensors)))
+    return WatchState(
+        reference=zero,
+        averaged=ZeroMean(),
+        time=np.nan,
+        memory=memory,
+        traces=traces,
+        used=none,
+        predicted=none,
+        usual=none,
+        fault=np.zeros(n, dtype=np.int8),
+        since=nan,
+        bridge=none,
+        jumped=nan,
+        off=nan,
+        same=nan,
+        still=nan,
+        then=none,
+        moving=nan,
+        back=nan,
+        evidence=np.zeros((*runs, len(watch.pairs[0]))),
+        fast=np.full(runs, -np.inf),
+        heat=heat.begin(watch, runs) if watch.checks else HeatState(),
+    )
 
 
 def is_quiet(watch: Watch, state: WatchState, time: float) -> bool:
@@ -59,8 +144,8 @@ def look(
         return _start(watch, state, time, believed, resting), believed
     zero = state.reference.take(temperatures, axis=-1)
     read = values.take(temperatures, axis=-1)
-    x = find_rises(state, read - zero)
-    missing = ~is_plausible(watch, x, zero + x)
+    x = read - zero
+    missing = ~is_plausible(watch, x, read)
     if (lost.any(axis=-1) & missing.all(axis=-1)).any():
         return state, believed  # there is no reading at all
     believed[..., watch.speeds] = heat.trust(watch, state.heat, speeds, lost)
@@ -68,12 +153,8 @@ def look(
         known = np.where(lost, np.nan, speeds)
         state = _step(watch, state, time, np.where(missing, np.nan, x), believed, known)
         believed[..., watch.speeds] = heat.trust(watch, state.heat, speeds, lost)
-        x = find_rises(state, read - zero)
-        missing = ~is_plausible(watch, x, zero + x)
-    if state.fault.any() or missing.any() or np.isfinite(state.jumped).any():
-        replaced = ~state.trusted | missing | np.isfinite(state.jumped)
-        own = np.where(state.order == np.arange(state.order.shape[-1]), read, zero + x)
-        believed[..., temperatures] = np.where(replaced, zero + state.used, own)
+    if (replaced := (state.fault != GOOD) | missing | np.isfinite(state.jumped)).any():
+        believed[..., temperatures] = np.where(replaced, zero + state.used, read)
     return state, believed
 
 
@@ -117,9 +198,9 @@ def _step(
     """Check all sensors and return the next state; `x` and `speeds` (as read) are nan where a value is missing."""
     dt, seen = time - state.time, np.isfinite(x)
     s = state._replace(time=time)
-    s, stepped = _jumps(watch, s, x, dt, seen & s.trusted)
+    s, stepped = _jumps(watch, s, x, dt, seen & (s.fault == GOOD))
     s = _missing(s, seen)
-    failed = ~s.trusted
+    failed = s.fault != GOOD
     some_failed, waiting = failed.any(), np.isfinite(s.jumped) & ~failed & seen
     used = np.where(waiting, s.usual + s.predicted, x)
     if some_failed:  # every missing sensor among them
@@ -174,7 +255,7 @@ def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArra
 
 
 def _missing(s: WatchState, seen: BoolArray) -> WatchState:
-    lost = ~seen & s.trusted
+    lost = ~seen & (s.fault == GOOD)
     if not lost.any():
         return s
     return s._replace(
@@ -250,10 +331,10 @@ def _blame(
     pair = (both.worst <= 1.0) & (watch.thresholds.swap_preferred * both.rest < rest)
     swapped = (lasting | (stepped | stuck).any(axis=-1)) & ~doubt & pair
     certain = watch.thresholds.swap_certain * both.rest < rest
-    s = _fail(watch, s, (swapped & ~certain)[..., None] & both.sensors, UNEXPLAINED, np.zeros(x.shape))
-    s = exchange(watch, s, (swapped & certain)[..., None] & both.sensors, x)
+    for mine, fault in ((swapped & certain, SWAPPED), (swapped & ~certain, UNEXPLAINED)):
+        s = _fail(watch, s, mine[..., None] & both.sensors, fault, np.zeros(x.shape))
     for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
-        s = _fail(watch, s, alone & ~swapped[..., None] & s.trusted, fault, bridge)
+        s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
     calm = able & np.isnan(s.jumped)
     one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm, s.heat)
     # speeds explain the residuals better; the states of estimated speeds lag behind
@@ -287,10 +368,9 @@ def _returns(watch: Watch, s: WatchState, difference: FloatArray) -> WatchState:
         back = np.where(fits, np.where(np.isfinite(s.back), s.back, s.time), np.nan)
         wait = np.where(missing, watch.thresholds.return_time, watch.thresholds.fault_rest)
         again = fits & (s.time - back >= wait)
-    fault = np.where(again, trust(s.order), s.fault).astype(np.int8)
     return s._replace(
-        fault=fault,
-        since=np.where(fault == GOOD, np.nan, s.since),
+        fault=np.where(again, GOOD, s.fault).astype(np.int8),
+        since=np.where(again, np.nan, s.since),
         usual=np.where(again, difference, s.usual),
         used=np.where(again, s.predicted + difference, s.used),
         same=np.where(again, np.nan, s.same),
@@ -315,5 +395,5 @@ def _fail(watch: Watch, s: WatchState, found: BoolArray, fault: int, bridge: Flo
         bridge=np.where(found, offset, s.bridge),
         used=np.where(found, s.predicted + offset, s.used),
         jumped=np.where(found, np.nan, s.jumped),
-        off=np.where(found.any(axis=-1, keepdims=True) & (fault == UNEXPLAINED), np.nan, s.off),
+        off=np.where(found.any(axis=-1, keepdims=True) & (fault in (UNEXPLAINED, SWAPPED)), np.nan, s.off),
     )

@@ -1,11 +1,11 @@
 """Sensor failure that explains the residuals of readings, with scalars and loops: see `thermocomp.runtime.blame`."""
 
 from thermocomp.runtime.program import heating
-from thermocomp.runtime.program.language import choose, each, let, otherwise, procedure, when
+from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, Whole, flag, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watchstate import GOOD, STEPPED, STUCK, SWAPPED, UNEXPLAINED
+from thermocomp.runtime.watch import GOOD, STEPPED, STUCK, SWAPPED, UNEXPLAINED
 
 
 @procedure
@@ -39,12 +39,12 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         with when(swapped):
             fail_both(s, w, t)
         for i in each("i", t.SENSORS):
-            w.failing[i] = w.stepped[i] & ~swapped & heating.trusts(s, i)
+            w.failing[i] = w.stepped[i] & ~swapped & s.fault[i].equals(GOOD)
             w.onset[i] = s.usual[i]
         w.new_fault = STEPPED
         fail(s, w, t)
         for i in each("i", t.SENSORS):
-            w.failing[i] = w.stuck[i] & ~swapped & heating.trusts(s, i)
+            w.failing[i] = w.stuck[i] & ~swapped & s.fault[i].equals(GOOD)
             w.onset[i] = w.x[i] - s.then_predicted[i]
         w.new_fault = STUCK
         fail(s, w, t)
@@ -73,51 +73,17 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
 
 @procedure
 def fail_both(s: Kept, w: Work, t: Constants) -> None:
-    """Exchange the two sensors whose swap explains the differences for certain; otherwise exclude them."""
+    """Exclude the two sensors whose swap explains the differences: swapped for certain, or else unexplained."""
+    for i in each("i", t.SENSORS):
+        w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
+        w.onset[i] = 0.0
     certain = let("certain", (w.one < 0) | (t.swap_certain * w.both_rest < w.one_rest))
     with when(t.supervised):
         certain.set(certain & (t.swap_certain * w.both_rest < w.speeds_rest))
+    w.new_fault = UNEXPLAINED
     with when(certain):
-        exchange(s, w, t)
-    with otherwise():
-        for i in each("i", t.SENSORS):
-            w.failing[i] = i.equals(t.pair_first[w.both]) | i.equals(t.pair_second[w.both])
-            w.onset[i] = 0.0
-        w.new_fault = UNEXPLAINED
-        fail(s, w, t)
-
-
-@procedure
-def exchange(s: Kept, w: Work, t: Constants) -> None:
-    """Let two sensors take each other's readings, and exchange their past in the predictions."""
-    a = let("a", t.pair_first[w.both])
-    b = let("b", t.pair_second[w.both])
-    taken = let("taken", s.order[a])
-    s.order[a] = s.order[b]
-    s.order[b] = taken
-    own = let("own", w.x[a])
-    w.x[a] = w.x[b]
-    w.x[b] = own
-    for k in each("k", t.TAUS):
-        own.set(s.memory[k * t.SENSORS + a])
-        s.memory[k * t.SENSORS + a] = s.memory[k * t.SENSORS + b]
-        s.memory[k * t.SENSORS + b] = own
-    for i in each("i", t.SENSORS):
-        s.is_off[i] = False
-        with when(i.equals(a) | i.equals(b)):
-            for k in each("k", t.TAUS):
-                s.traces[k * t.SENSORS + i] = 0.0
-            s.used[i] = w.x[i]
-            s.usual[i] = 0.0
-            s.fault[i] = GOOD
-            with when(s.order[i].differs(i)):
-                s.fault[i] = SWAPPED
-            s.since[i] = w.now
-            s.has_jumped[i] = False
-            s.read_once[i] = False
-            s.is_moving[i] = False
-    s.evidence[w.both] = 0.0
-    predict(s, w, t)
+        w.new_fault = SWAPPED
+    fail(s, w, t)
 
 
 @procedure
@@ -222,17 +188,6 @@ def fail(s: Kept, w: Work, t: Constants) -> None:
             s.bridge[i] = w.onset[i]
             s.used[i] = s.predicted[i] + w.onset[i]
             s.has_jumped[i] = False
-    with when(fails & w.new_fault.equals(UNEXPLAINED)):
+    with when(fails & (w.new_fault.equals(UNEXPLAINED) | w.new_fault.equals(SWAPPED))):
         for i in each("i", t.SENSORS):
             s.is_off[i] = False
-
-
-@procedure
-def predict(s: Kept, w: Work, t: Constants) -> None:
-    """Predict each temperature from the others, their lags and the states of the speed."""
-    for i in each("i", t.SENSORS):
-        s.predicted[i] = 0.0
-        for k in each("k", t.SENSORS):
-            s.predicted[i] = s.predicted[i] + s.used[k] * t.direct[k, i]
-        for k in each("k", t.MEMORY):
-            s.predicted[i] = s.predicted[i] + s.memory[k] * t.weight[k, i]

@@ -1,10 +1,10 @@
 """Repetition of all temperatures with scalars and loops only: see `thermocomp.runtime.feed` for explanations."""
 
 from thermocomp.runtime.feed import LARGEST, MOST_REPEATED, NONE
-from thermocomp.runtime.program.heating import trusts
 from thermocomp.runtime.program.language import choose, each, let, otherwise_when, procedure, when
 from thermocomp.runtime.program.values import Whole, flag, integer
 from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.watch import GOOD
 
 STOPPED = 4
 
@@ -85,7 +85,7 @@ def compare_predictions(s: Kept, w: Work, t: Constants) -> None:
             for i in each("i", t.SENSORS):
                 moved = let("moved", abs(s.predicted[i] - s.feed_predicted[i]))
                 least = let("least", t.repeat_moved * s.feed_step[t.feed_place[i]])
-                with when(trusts(s, i) & (moved > t.frozen_limit[i]) & (moved > least)):
+                with when(s.fault[i].equals(GOOD) & (moved > t.frozen_limit[i]) & (moved > least)):
                     s.feed_moved = True
             with when(s.feed_moved):
                 w.passes = False

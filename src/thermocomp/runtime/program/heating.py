@@ -2,14 +2,9 @@
 
 from thermocomp.runtime.program.language import choose, each, function, let, procedure, raised, when
 from thermocomp.runtime.program.numbers import follow, larger, smaller
-from thermocomp.runtime.program.values import Condition, Number, Whole, flag, real
+from thermocomp.runtime.program.values import Number, flag, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watchstate import GOOD, MISSING, OFF, SWAPPED
-
-
-def trusts(s: Kept, i: Whole) -> Condition:
-    """Return whether the reading of a sensor is used: of two that are swapped each takes that of the other."""
-    return s.fault[i].equals(GOOD) | s.fault[i].equals(SWAPPED)
+from thermocomp.runtime.watch import GOOD, MISSING, OFF
 
 
 @procedure
@@ -83,7 +78,7 @@ def check_speeds(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             most.set(cutting * smaller(t.heat_power[c], real(1.0)))
         least = let("least", t.off_limit[t.SENSORS + c])
         for i in each("i", t.SENSORS):
-            with when(~trusts(s, i)):
+            with when(s.fault[i].differs(GOOD)):
                 least.set(least + t.heat_reach[i, c])
         most.set(most + least)
         with when(abs(apart) > most):

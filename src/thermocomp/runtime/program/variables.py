@@ -70,7 +70,7 @@ class Kept(Record):
     feed_predicted = numbers("predictions at the first repeated reading [degC]", "SENSORS")
     feed_moved = truth("a temperature should have changed since")
 
-    # of the watch over the temperatures: see `thermocomp.runtime.watchstate.WatchState`
+    # of the watch over the temperatures: see `thermocomp.runtime.watch.WatchState`
     looked = truth("the watch has started")
     look = number("time of the last update of the watch [s]", time=True)
     watch_zero = numbers("zero of its inputs", "WATCHED")
@@ -104,7 +104,6 @@ class Kept(Record):
     back = numbers("time since which a missing sensor reads its prediction again [s]", "SENSORS", time=True)
     cleared = truths("the two sensors are not swapped", "PAIRS")
     evidence = numbers("evidence that the two sensors are swapped", "PAIRS")
-    order = wholes("sensor whose reading each takes: its own, unless two are swapped", "SENSORS")
     was_fast = truth("the spindle has turned faster than in training")
     fast = number("time of the last speed above those of training [s]", time=True)
 

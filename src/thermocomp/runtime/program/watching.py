@@ -2,7 +2,6 @@
 
 from thermocomp.runtime.program import blaming, heating
 from thermocomp.runtime.program.averaging import Averaged
-from thermocomp.runtime.program.heating import trusts
 from thermocomp.runtime.program.language import (
     choose,
     each,
@@ -17,7 +16,7 @@ from thermocomp.runtime.program.language import (
 from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watchstate import GOOD, MISSING, OFF, SWAPPED, UNEXPLAINED
+from thermocomp.runtime.watch import GOOD, MISSING, OFF, UNEXPLAINED
 
 HOLDING = 2
 
@@ -46,16 +45,14 @@ def read_sensors(s: Kept, w: Work, t: Constants) -> None:
     """Read the temperatures; without any of them, and with a speed missing, there is no reading."""
     some = let("some", flag(False))
     for i in each("i", t.SENSORS):
-        taken = let("taken", s.order[i])
-        c = let("c", t.sensor_channel[taken])
+        c = let("c", t.sensor_channel[i])
         w.there[i] = False
         w.x[i] = 0.0
-        with when(w.given[c]):
-            w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[taken]]
-            w.middle = s.watch_zero[t.sensor_input[i]] + w.x[i]
-            w.there[i] = (w.middle >= t.least_temperature) & (w.middle <= t.most_temperature)
-            w.there[i] = w.there[i] & (w.x[i] >= t.sensor_low[i] - t.sensor_span[i])
-            w.there[i] = w.there[i] & (w.x[i] <= t.sensor_high[i] + t.sensor_span[i])
+        with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
+            w.x[i] = w.value[c] - s.watch_zero[t.sensor_input[i]]
+            w.there[i] = (w.x[i] >= t.sensor_low[i] - t.sensor_span[i]) & (
+                w.x[i] <= t.sensor_high[i] + t.sensor_span[i]
+            )
         some.set(some | w.there[i])
     for k in each("k", t.SPEEDS):
         w.made = w.made & (some | ~w.speed_lost[k])
@@ -68,15 +65,11 @@ def pass_on(s: Kept, w: Work, t: Constants) -> None:
         heating.trust_speeds(s, w, t)
     with when(w.now - s.look >= t.check_interval):
         look(s, w, t)
-        read_sensors(s, w, t)
         with when(t.supervised):
             heating.trust_speeds(s, w, t)
     for i in each("i", t.SENSORS):
-        with when(~trusts(s, i) | ~w.there[i] | s.has_jumped[i]):
+        with when(s.fault[i].differs(GOOD) | ~w.there[i] | s.has_jumped[i]):
             w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + s.used[i]
-            w.given[t.sensor_channel[i]] = True
-        with otherwise_when(s.order[i].differs(i)):
-            w.value[t.sensor_channel[i]] = s.watch_zero[t.sensor_input[i]] + w.x[i]
             w.given[t.sensor_channel[i]] = True
 
 
@@ -124,7 +117,6 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
         for i in each("i", t.SENSORS):
             s.used[i] = w.change[t.sensor_input[i]]
             s.still[i] = w.now
-            s.order[i] = i
         for k in each("k", t.SPEEDS):
             w.speed[k] = w.change[t.speed_input[k]] + s.watch_zero[t.speed_input[k]]
         calm_down(s, w, t)
@@ -133,7 +125,7 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
                 s.memory[k * t.SENSORS + i] = s.used[i]
         for k in each("k", t.STATES):
             s.memory[t.LAGGED + k] = raised(abs(w.change[t.state_input[k]]) / t.top_speed, t.power[k])
-        blaming.predict(s, w, t)
+        predict(s, w, t)
         with when(t.supervised):
             heating.begin_heats(s, w, t)
         s.looked = True
@@ -149,32 +141,43 @@ def calm_down(s: Kept, w: Work, t: Constants) -> None:
 
 
 @procedure
+def predict(s: Kept, w: Work, t: Constants) -> None:
+    """Predict each temperature from the others, their lags and the states of the speed."""
+    for i in each("i", t.SENSORS):
+        s.predicted[i] = 0.0
+        for k in each("k", t.SENSORS):
+            s.predicted[i] = s.predicted[i] + s.used[k] * t.direct[k, i]
+        for k in each("k", t.MEMORY):
+            s.predicted[i] = s.predicted[i] + s.memory[k] * t.weight[k, i]
+
+
+@procedure
 def look(s: Kept, w: Work, t: Constants) -> None:
     """Check all temperature sensors and advance their predictions."""
     elapsed = let("elapsed", w.now - s.look)
     s.look = w.now
     find_jumps(s, w, t, elapsed)
     for i in each("i", t.SENSORS):
-        with when(~w.there[i] & trusts(s, i)):
+        with when(~w.there[i] & s.fault[i].equals(GOOD)):
             s.fault[i] = MISSING
             s.since[i] = w.now
             s.bridge[i] = s.usual[i]
             s.is_back[i] = False
             s.has_jumped[i] = False
-        w.waiting[i] = s.has_jumped[i] & trusts(s, i) & w.there[i]
+        w.waiting[i] = s.has_jumped[i] & s.fault[i].equals(GOOD) & w.there[i]
     for i in each("i", t.SENSORS):
         s.used[i] = w.x[i]
-        with when(~trusts(s, i)):
+        with when(s.fault[i].differs(GOOD)):
             s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / t.substitute_fade)
         with otherwise_when(w.waiting[i]):
             s.used[i] = s.usual[i] + s.predicted[i]
     advance(s, w, t, elapsed)
-    blaming.predict(s, w, t)
+    predict(s, w, t)
     for i in each("i", t.SENSORS):
-        with when(~trusts(s, i)):
+        with when(s.fault[i].differs(GOOD)):
             s.used[i] = s.predicted[i] + s.bridge[i] * exp(-(w.now - s.since[i]) / t.substitute_fade)
         w.difference[i] = w.x[i] - s.predicted[i]
-        w.calm[i] = trusts(s, i) & w.there[i] & ~w.waiting[i]
+        w.calm[i] = s.fault[i].equals(GOOD) & w.there[i] & ~w.waiting[i]
         with when(w.calm[i]):
             s.usual[i] = follow(s.usual[i], w.difference[i], elapsed / t.difference_time)
     for k in each("k", t.TAUS):
@@ -200,7 +203,7 @@ def find_jumps(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             slack.set(slack * (elapsed / t.pace))
         w.before[i] = choose(s.has_jumped[i], s.predicted[i] + s.usual[i], s.used[i])
         w.stepped[i] = False
-        with when(w.there[i] & trusts(s, i)):
+        with when(w.there[i] & s.fault[i].equals(GOOD)):
             w.far[i] = abs(w.x[i] - w.before[i]) > slack
             with when(~w.far[i]):
                 s.has_jumped[i] = False
@@ -311,8 +314,6 @@ def believe_again(s: Kept, w: Work, t: Constants) -> None:
         s.is_back[i] = fits
         with when(fits & (w.now - s.back[i] >= choose(missing, t.return_time, t.fault_rest))):
             s.fault[i] = GOOD
-            with when(s.order[i].differs(i)):
-                s.fault[i] = SWAPPED
             s.usual[i] = w.difference[i]
             s.used[i] = s.predicted[i] + w.difference[i]
             s.read_once[i] = False
@@ -327,7 +328,7 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
         allowed = let("allowed", flag(True))
         effects = let("effects", real(0.0))
         for i in each("i", t.FAILING):
-            with when(~trusts(s, i) & t.leans_on[m, i]):
+            with when(s.fault[i].differs(GOOD) & t.leans_on[m, i]):
                 lost.set(lost + 1)
                 effects.set(effects + t.effect[m, i])
                 allowed.set(allowed & t.may_lose[m, i] & ((i < t.SENSORS) | s.fault[i].differs(OFF)))
@@ -336,7 +337,7 @@ def judge(s: Kept, w: Work, t: Constants, k: Whole) -> None:
             for j in each("j", t.JUDGED):
                 fits = let("fits", t.judged_model[j].equals(m))
                 for i in each("i", t.FAILING):
-                    gone = let("gone", ~trusts(s, i) & t.leans_on[m, i])
+                    gone = let("gone", s.fault[i].differs(GOOD) & t.leans_on[m, i])
                     fits.set(fits & t.judged_without[j, i].equals(gone))
                 found.set(found | fits)
             allowed.set(allowed & found)
