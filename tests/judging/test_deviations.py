@@ -69,6 +69,16 @@ def test_a_model_of_large_opposed_gains_is_unproven(model: ErrorModel) -> None:
         assert np.abs(clean).max() < 0.05 * found.none_rms
 
 
+def test_a_test_without_rows_is_no_obstacle(model: ErrorModel) -> None:
+    other = failing(t1_C=(9.0, 0.01))
+    found = []
+    for days in ([failing(), other], [other]):
+        samples = stack(days, ["z_um"], ["t1_C", "t2_C", "t3_C", "spindle_rpm"])
+        last = samples.take(samples.test == len(days) - 1)
+        found.append(stress(model, last, last.deviations[:, 0], np.ones(len(last), np.bool_), draws=1).robustness)
+    assert found[0].deviating == found[1].deviating
+
+
 def test_deviations_are_pooled_and_the_worse_counts() -> None:
     one = Robustness(0.4, {"uniform": (1.0, 1.0)}, {"a": 1.0}, 0.0, np.nan, 4.0, deviating={"a": (1.0, 3.0)})
     other = replace(one, none_rms=2.0, deviating={"a": (1.2, 5.0), "b": (1.0, 1.0)})

@@ -256,7 +256,8 @@ def _disturb(
     let = [
         {columns[c]: v for c, v in guard.readings.get(of, {}).items() if c in columns} if guard else {} for of in lost
     ]
-    first = np.array([samples.time[samples.test == test].min() for test in range(len(samples.test_names))])
+    first = np.full(len(samples.test_names), np.inf)
+    np.minimum.at(first, samples.test, samples.time)
     zeroed = samples.time > first[samples.test] + model.zeroing.at_rest
     rng = np.random.default_rng(0)
     adjacent = temperatures.size and temperatures[-1] - temperatures[0] + 1 == temperatures.size
