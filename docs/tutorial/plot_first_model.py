@@ -158,9 +158,9 @@ assert honest.verdict == "unproven"
 # %%
 # The model is unproven, although its error is small. Temperatures are collinear, and with a weak ridge penalty the
 # effects of single sensors are large and cancel each other, until a sensor deviates from the others in a new way: heat
-# from another axis, or colder coolant. No watch detects 1 degC, and it would move this correction by more than the
-# drift itself. With a stronger penalty, the model depends less on each sensor, at the cost of a slightly larger error
-# on unseen cycles.
+# from another axis, or colder coolant. A watch may not detect 1 degC, and it would move this correction by more than
+# the drift itself. With a stronger penalty, the model depends less on each sensor, at the cost of a slightly larger
+# error on unseen cycles.
 
 steady = DynamicRidge(strengths=(1e-3, 1e-2, 0.1, 1.0))
 model = study.fit(samples, steady, judging).models[0]

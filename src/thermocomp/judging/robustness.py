@@ -15,8 +15,8 @@ from thermocomp.recordings.samples import Samples
 
 #: amplitude of the noise on every temperature (C-33) [degC]
 NOISE = 0.4
-#: lasting deviation of a temperature, at most half its trained range, that no watch detects [degC]: heat from an axis
-#: that did not move in the recording, colder coolant, or a drift of the sensor
+#: lasting deviation of a temperature, at most half its trained range [degC]. A watch may not detect it if it grows
+#: slowly: heat from an axis that did not move in the recording, colder coolant, or a drift of the sensor
 OFF = 1.0
 
 
@@ -47,7 +47,7 @@ class Robustness:
         RMS with several sensors lost at once (``t1_C, t2_C``); used only to decide whether the model may then run
         [um].
     deviating : dict of str to tuple of float
-        By temperature: lasting deviation that no watch detects [degC], and RMS with it [um].
+        By temperature: lasting deviation that a watch may not detect [degC], and RMS with it [um].
     """
 
     noise: float
@@ -287,7 +287,7 @@ def _disturb(
 
 
 def _find_undetected(model: ErrorModel, samples: Samples) -> dict[str, float]:
-    """Return a lasting deviation of each temperature that no watch detects [degC].
+    """Return a lasting deviation of each temperature that a watch may not detect [degC].
 
     Its sign is towards the middle of the trained range, so that the support does not hide its effect.
     """
