@@ -92,3 +92,16 @@ def test_deviations_are_pooled_and_the_worse_counts() -> None:
     assert one.worst_off == ("a", 3.0)
     assert one.harm == ""
     assert other.harm == "worse than no compensation (2.00 um RMS) with a off by 1.2 degC (5.00 um)"
+
+
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_sensor_at_an_end_of_its_range_is_put_off_towards_the_middle(model: ErrorModel, end: str) -> None:
+    """Beyond the range the input is limited: a deviation outwards would have no effect."""
+    limited = replace(model, support=replace(model.support, margin=0.0))
+    samples = stack([failing()], ["z_um"], ["t1_C", "t2_C", "t3_C", "spindle_rpm"])
+    (warm,) = (i for i in model.inputs if i.name == "t2_C")
+    values = samples.values.copy()
+    values[20:, 1] = values[:6, 1].mean() + (warm.high + 0.5 if end == "high" else warm.low - 0.5)
+    samples, every = replace(samples, values=values), np.ones(len(samples), np.bool_)
+    found = stress(limited, samples, replay(limited, samples, every)[0], every, draws=1).robustness
+    assert found.deviating["t2_C"][1] > 0.1
