@@ -70,7 +70,14 @@ def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     assert "Honest error (on unseen cycles): 1.25 um RMS, largest 2.00; without compensation 5.00 RMS." in lines
     assert "Verdict: accepted, worse than none on cycle 3." in lines
     assert f"Uncertainty band: {band.tell('um')}." in lines
-    assert "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds from 0 to 3000 1/min" in text
+    assert (
+        "13.3 h, 4 cycles or tests, 3 of them distinct; 2 spindle speeds from 0 to 3000 1/min; axes not recorded"
+        in text
+    )
+    assert "axes stood still: their heat was not judged" in str(
+        explain(replace(model, validity=replace(covered, axes="stood still")))
+    )
+    assert "axes moved;" in str(explain(replace(model, validity=replace(covered, axes="moved"))))
     assert "1.50 um without it" in next(line for line in lines if line.startswith("  t1_C"))
     third = next(line for line in lines if line.startswith("  t3_C"))
     left, _, spare = third.partition("; spare recommended: ")

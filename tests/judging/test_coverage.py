@@ -54,6 +54,37 @@ def test_only_what_was_judged_counts() -> None:
     assert last.ambient[0] > 22
 
 
+@pytest.mark.parametrize(
+    ("quantity", "unit", "values", "axes"),
+    [
+        ("feed", "mm/min", (0.0, 0.0), "stood still"),
+        ("feed", "mm/min", (6000.0, 6000.0), "moved"),
+        ("position", "mm", (250.0, 250.0), "stood still"),
+        ("position", "mm", (250.0, 250.1), "moved"),
+        ("position", "mm", (np.nan, np.nan), "not recorded"),
+        ("dimensionless", "", (0.0, 1.0), "not recorded"),
+    ],
+)
+def test_it_tells_whether_axes_moved(quantity: str, unit: str, values: tuple[float, float], axes: str) -> None:
+    plain = small_machine()
+    column = np.where(np.arange(len(plain)) % 50 == 7, values[1], values[0])
+    channels = (*plain.channels, Channel("axis", quantity, unit))
+    recording = replace(plain, table=plain.table.assign(axis=column), channels=channels)
+    samples = stack([recording], ["z_um"], ["t1_C", "t2_C", "spindle_rpm"])
+    found = coverage.find_validity(samples, splits.leave_one_cycle_out(samples), [recording])
+    assert found.axes == axes
+    assert {str(row[0]): row[1] for row in coverage.table({"": found}).rows}["axes"] == axes
+    assert covered([plain]).axes == "not recorded"
+
+
+def test_axes_that_move_before_the_judged_rows_do_not_count() -> None:
+    plain = small_machine()
+    moved = plain.table.assign(feed_mm_min=np.where(np.arange(len(plain)) < 50, 6000.0, 0.0))
+    recording = replace(plain, table=moved, channels=(*plain.channels, Channel("feed_mm_min", "feed", "mm/min")))
+    samples = stack([recording], ["z_um"])
+    assert coverage.find_validity(samples, splits.parse("0.75/0.25", samples), [recording]).axes == "stood still"
+
+
 def copied(times: int, noise: float, room: float = 0.0) -> list[Recording]:
     """Return the same test several times, with other noise, and in a room that is warmer each time."""
     plain = small_machine()

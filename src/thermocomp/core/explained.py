@@ -283,6 +283,7 @@ def _covered(model: ErrorModel) -> str:
     parts = [f"{v.hours:.1f} h, {v.units} cycles or tests, {v.independent} of them distinct"]
     if v.speeds:
         parts.append(f"{len(v.speeds)} spindle speeds from {v.speeds[0]:.0f} to {v.speeds[-1]:.0f} 1/min")
+    parts.append({"moved": "axes moved"}.get(v.axes, f"axes {v.axes}: their heat was not judged"))
     if v.ambient:
         parts.append(f"{v.ambient_channel} {v.ambient[0]:.1f} to {v.ambient[1]:.1f} degC")
     if v.start:

@@ -1,6 +1,7 @@
 """Conditions covered by the cycles, files or blocks on which a model was judged."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from thermocomp.core.bounds import COEFFICIENT, check_between, check_finite, check_name
 from thermocomp.core.exceptions import SettingError
@@ -32,6 +33,8 @@ class Validity:
         Number of calendar days with judged rows; 0 if the recordings have no time stamps.
     hours : float
         Total judged duration [h].
+    axes : {'moved', 'stood still', 'not recorded'}
+        Whether axes moved in the judged rows, by channels of feeds and positions: their heat is judged only then.
 
     Raises
     ------
@@ -48,6 +51,7 @@ class Validity:
     start: tuple[float, float] | None
     days: int
     hours: float
+    axes: Literal["moved", "stood still", "not recorded"] = "not recorded"
 
     def __post_init__(self) -> None:
         if not 0 <= self.independent <= self.units:

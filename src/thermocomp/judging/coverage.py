@@ -9,6 +9,7 @@ same program on a similar day, adds no information. Alike blocks count once (sin
 """
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -47,6 +48,7 @@ def find_validity(samples: Samples, judging: Judging, recordings: Sequence[Recor
         start=(min(starts), max(starts)) if starts else None,
         days=int(np.unique(days[~np.isnat(days)]).size),
         hours=float(np.where(np.isfinite(samples.dt()), samples.dt(), 0.0)[judged].sum() / 3600.0),
+        axes=_axes(samples, judged, recordings),
     )
 
 
@@ -104,6 +106,20 @@ def _speeds(samples: Samples, judged: BoolArray, recordings: Sequence[Recording]
     return tuple(found)
 
 
+def _axes(
+    samples: Samples, judged: BoolArray, recordings: Sequence[Recording]
+) -> Literal["moved", "stood still", "not recorded"]:
+    given = [(c.quantity, samples.values[judged, j]) for j, c in enumerate(samples.inputs)]
+    for k, recording in enumerate(recordings):
+        rows = samples.row[judged & (samples.test == k)]
+        given += [(c.quantity, recording.values([c])[rows, 0]) for c in recording.channels]
+    moved = list[bool]()
+    for quantity, values in given:
+        if quantity in ("feed", "position") and (known := values[np.isfinite(values)]).size:
+            moved.append(bool(np.ptp(known) > 0 or (quantity == "feed" and known.any())))
+    return "moved" if any(moved) else "stood still" if moved else "not recorded"
+
+
 def _ambient(
     samples: Samples, judged: BoolArray, recordings: Sequence[Recording]
 ) -> tuple[str, tuple[float, float] | None]:
@@ -142,6 +158,7 @@ def _cells(v: Validity) -> dict[str, str]:
         "two most similar": "" if v.nearest is None else f"differ by {v.nearest:.2f} of the inputs' spread",
         "hours, days": f"{v.hours:.1f} h{days}",
         "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
+        "axes": v.axes,
         "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not specified",
         "mean temperature at the start [degC]": _range(v.start) if v.start else "",
     }
