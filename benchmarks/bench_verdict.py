@@ -9,7 +9,9 @@ Printed are, for each kind of recording, the shares in which the recommendation,
 and *accepted for this duty*; then the share that counts (the recommendation), its exact 95 % interval, and the goal.
 Of the kinds in which the same drift occurs again and again (`ONE_DUTY`), *accepted for this duty* is not false. Of the
 kinds with a good model (``true_...``) it is enough if all cycles repeat one duty; for these kinds a table shows why the
-recommendation was not accepted. A recording in which repeated rows are found is rejected, and counts as not accepted.
+recommendation was not accepted. Of cold starts with a good model only those recordings count whose best method (least
+error) does no harm in twenty fresh cycles of the same machine; their share is printed. A recording in which repeated
+rows are found is rejected, and counts as not accepted.
 Exit code 1 if a goal is missed.
 """
 
@@ -31,10 +33,13 @@ import verdict_second
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
 from thermocomp.core.provenance import Word, accepted
+from thermocomp.core.size import Size
 from thermocomp.judging import splits
 from thermocomp.judging.baselines import BASELINES, OF_TIME
 from thermocomp.judging.compare import compare
-from thermocomp.judging.do_no_harm import LEVEL, Verdict
+from thermocomp.judging.do_no_harm import LEVEL, Verdict, margin_of
+from thermocomp.judging.replay import replay
+from thermocomp.models.training import train
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -76,6 +81,7 @@ class Outcome(NamedTuple):
     recommended: str  #: word of the recommendation
     any: str  #: most favourable word of the methods
     why: str  #: why the recommendation was not accepted, one of `WHY`; empty if it was
+    good: bool  #: the best method does no harm in fresh cycles, or there are none
 
 
 # -- a recording -------------------------------------------------------------------------------------------------------
@@ -109,10 +115,24 @@ def judged(make: Make, judging: Callable[[Samples], splits.Judging], methods: Se
     except InputError as e:
         if "repeat rows" not in str(e):
             raise
-        return Outcome(case.null, case.duty, REJECTED, REJECTED, REJECTED)
+        return Outcome(case.null, case.duty, REJECTED, REJECTED, REJECTED, good=True)
     best = max(found.overall(), key=lambda a: (a.word == "accepted", a.accepted))
     verdict = found.recommended[0].verdict if found.recommended else best.verdict
-    return Outcome(case.null, case.duty, verdict.word, best.word, reason(verdict, case.duty))
+    good = not case.fresh or does_no_harm(samples, to_samples(Case(case.fresh, case.null)), methods)
+    return Outcome(case.null, case.duty, verdict.word, best.word, reason(verdict, case.duty), good)
+
+
+def does_no_harm(samples: Samples, fresh: Samples, methods: Sequence[str]) -> bool:
+    """Return whether the method with the least error on fresh tests does no harm in any of them."""
+    learned, every = np.ones(len(samples), dtype=np.bool_), np.ones(len(fresh), dtype=np.bool_)
+    margin, y = margin_of(samples.learned(0, learned)), fresh.deviations[:, 0]
+    errors = [y - replay(train(m, samples, 0, learned).model, fresh, every)[0] for m in methods]
+    e = min(errors, key=lambda e: float(np.mean(e**2)))
+    harm = [
+        max(Size.of(e[own]).rms - Size.of(y[own]).rms, Size.of(e[own]).largest - Size.of(y[own]).largest)
+        for own in (fresh.test == k for k in range(len(fresh.test_names)))
+    ]
+    return max(harm) <= margin
 
 
 def reason(verdict: Verdict, duty: bool) -> str:
@@ -150,17 +170,19 @@ def goal(name: str, null: bool) -> tuple[float, float]:
 
 def print_kind(name: str, found: Sequence[Outcome], took: float) -> bool:
     """Print the shares of a kind; return whether its goal is reached."""
-    n, k = len(found), counted(name, found)
+    null, drawn, found = found[0].null, len(found), [o for o in found if o.good]
+    n, k = max(len(found), 1), counted(name, found) if found else 0
     words = [o.recommended for o in found], [o.any for o in found]
     shares = [column.count(w) / n for column in words for w in ("accepted", DUTY)]
     low, high = stats.binomtest(k, n).proportion_ci(method="exact")
-    least, most = goal(name, found[0].null)
+    least, most = goal(name, null)
     told = f"<= {most:.1%}" if most < 1 else f">= {least:.0%}" if least > 0 else ""
     ok = least <= k / n <= most
     rejected = sum(o.recommended == REJECTED for o in found)
     print(
         f"{name:39}{''.join(f'{s:7.1%}' for s in shares)} {k / n:8.1%} {f'{low:.1%}-{high:.1%}':>13}  {told:8}"
-        f"{'' if ok else 'MISSED'}{f' {rejected} rejected' if rejected else ''} {took:.0f} s",
+        f"{'' if ok else 'MISSED'}{f' {rejected} rejected' if rejected else ''}"
+        f"{f' {len(found)} of {drawn} do no harm in fresh cycles' if len(found) < drawn else ''} {took:.0f} s",
         flush=True,
     )
     return ok
@@ -176,7 +198,7 @@ def print_reasons(truths: dict[str, list[Outcome]]) -> None:
     print(f"{'':39}{''.join(f'{w:>9}' for w in names)}")
     for name, found in truths.items():
         counts = Counter(o.why for o in found)
-        print(f"{name:39}{''.join(f'{counts[w] / len(found):9.1%}' for w in WHY)}")
+        print(f"{name:39}{''.join(f'{counts[w] / max(len(found), 1):9.1%}' for w in WHY)}")
 
 
 def run_set(which: str, kinds: dict[str, Make], options: argparse.Namespace) -> list[str]:
@@ -195,7 +217,7 @@ def run_set(which: str, kinds: dict[str, Make], options: argparse.Namespace) -> 
         if not print_kind(name, found, time.perf_counter() - begin):
             missed.append(f"{which} {name}")
         if not found[0].null:
-            truths[name] = found
+            truths[name] = [o for o in found if o.good]
         elif not begins(name, tuple(MOST)):
             pool.append((counted(name, found), len(found)))
     if pool:

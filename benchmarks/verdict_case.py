@@ -51,11 +51,14 @@ class Case:
         True if no model may be accepted: the drift has nothing to do with the temperatures, or every model does harm.
     duty : bool
         True if all cycles repeat one duty.
+    fresh : sequence of File
+        Further cold starts of the same machine, with which nothing is fitted or judged: does a good model do harm?
     """
 
     files: Sequence[File]
     null: bool
     duty: bool = False
+    fresh: Sequence[File] = ()
 
 
 def times(n: int, dt: float) -> FloatArray:
@@ -63,4 +66,6 @@ def times(n: int, dt: float) -> FloatArray:
     return np.arange(n, dtype=np.float64) * dt
 
 
+#: number of fresh cycles of a good model
+FRESH = 20
 Make = Callable[[np.random.Generator], Case]

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from verdict_case import Case, File, FloatArray, Make, times
+from verdict_case import FRESH, Case, File, FloatArray, Make, times
 
 #: [s]
 HOUR = 3600.0
@@ -290,16 +290,16 @@ def true_starts(files: int, left: float, spread: float, *, same: bool = False) -
         lags, weights = rng.uniform(0.02, 1, m) * HOUR, rng.normal(size=m) / size
         t, first = np.arange(n) * dt, speeds(rng, n, dt)
         temperatures, told = [], []
-        for _ in range(files):
+        for _ in range(files + FRESH):
             s = first if same else speeds(rng, n, dt)
             air = rng.uniform(-2, 2) * lag(np.ones(n), dt, 3 * HOUR)
             air += rng.uniform(0.3, 1.5) * np.sin(2 * np.pi * (t / 24 / HOUR + rng.uniform()))
             T = heated(s, air - air[0], dt, taus, power, size) + 18 + rng.uniform(0, 6)
             temperatures.append(T)
             told.append(sum((weights[j] * lag(T[:, j] - T[0, j], dt, lags[j]) for j in range(m)), np.zeros(n)))
-        scale = 25 / np.std(np.concatenate(told))
+        scale = 25 / np.std(np.concatenate(told[:files]))
         told = [scale * x for x in told]
-        base, found = strongest(told), []
+        base, found = strongest(told[:files]), []
         for day, (T, seen) in enumerate(zip(temperatures, told, strict=True)):
             unseen = left * np.exp(spread * rng.normal()) * base
             for _ in range(200):
@@ -308,7 +308,7 @@ def true_starts(files: int, left: float, spread: float, *, same: bool = False) -
                 if rms(seen + other) >= unseen and np.abs(seen + other).max() >= np.abs(other).max():
                     break
             found.append(read(rng, dt, T, seen + other, day=day))
-        return Case(found, null=False, duty=same)
+        return Case(found[:files], null=False, duty=same, fresh=found[files:])
 
     return make
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from thermocomp.judging import splits
 from thermocomp.recordings.samples import Samples
-from verdict_case import Case, File, FloatArray, Make, times
+from verdict_case import FRESH, Case, File, FloatArray, Make, times
 
 #: rows of a cycle, sensors
 ROWS, SENSORS = 60, 4
@@ -64,7 +64,7 @@ def collinear(left: float, cycles: int, *, harm: float = 0.0) -> Make:
 
     def make(rng: np.random.Generator) -> Case:
         found = []
-        for k in range(cycles):
+        for k in range(cycles + (0 if harm else FRESH)):
             size = rng.uniform(15, 40)  # RMS of the drift [um]
             told, unknown = parts(rng, left)
             while not harm and np.abs(unknown).max() > np.abs(told + unknown).max():
@@ -75,7 +75,7 @@ def collinear(left: float, cycles: int, *, harm: float = 0.0) -> Make:
                 told = told * harm / size
             x = 20 + 0.3 * size * told[:, None] + 0.05 * rng.normal(size=(ROWS, SENSORS))
             found.append(file(x, drift + 0.2 * rng.normal(size=ROWS)))
-        return Case(found, null=harm > 0)
+        return Case(found[:cycles], null=harm > 0, fresh=found[cycles:])
 
     return make
 

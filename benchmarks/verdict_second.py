@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from verdict_case import Case, File, FloatArray, Make, times
+from verdict_case import FRESH, Case, File, FloatArray, Make, times
 from verdict_machine import (
     PROCESSES,
     RNG,
@@ -287,7 +287,7 @@ def true_starts(k: int, share: tuple[float, float], spread: float, repeat: bool 
         (dt, n), m = steps(rng), int(rng.integers(3, 9))
         n = max(n, int(1.2 * H / dt))
         machine, v = plant(rng, m, False), profile(rng, n, dt, 5000)
-        rows = [n if repeat else int(np.clip(n * rng.uniform(0.85, 1.2), 40, 150)) for _ in range(k)]
+        rows = [n if repeat else int(np.clip(n * rng.uniform(0.85, 1.2), 40, 150)) for _ in range(k + FRESH)]
         vs = [v if repeat else profile(rng, r, dt, rng.uniform(2000, 5000)) for r in rows]
         airs = [weather(rng, r, dt, 2.0 if repeat else 1.0) for r in rows]
         plan = schedule(rng, n, dt, m) if repeat else None
@@ -300,15 +300,19 @@ def true_starts(k: int, share: tuple[float, float], spread: float, repeat: bool 
         left = rng.uniform(*share) if share[0] < share[1] else share[0]
 
         def unseen(a: FloatArray) -> list[FloatArray]:
-            return [s * u for s, u in zip(a, raw, strict=True)]
+            return [s * u for s, u in zip(a, raw, strict=False)]
 
-        ys = calibrate(rng, seen, unseen, [x - x[0] for x in errs], left, spread, False)
+        zeroed = [x - x[0] for x in errs]
+        ys = calibrate(rng, seen[:k], unseen, zeroed[:k], left, spread, False)
         if ys is None:
             return None
+        size = np.exp(np.mean([np.log(rms(y - s) / rms(u)) for y, s, u in zip(ys, seen, raw, strict=False)]))
+        fresh = unseen(size * np.exp(spread * rng.normal(size=len(rows))))
+        ys += [s + u + e for s, u, e in zip(seen, fresh, zeroed, strict=True)][k:]
         Ts = [np.round(T + e * rng.normal(size=T.shape), 2) for T in Ts]
-        parts = zip(rows, Ts, vs, ys, days(rng, k), strict=True)
+        parts = zip(rows, Ts, vs, ys, days(rng, k + FRESH), strict=True)
         files = [File(times(r, dt), T, s, y, [(0, r)], d) for r, T, s, y, d in parts]
-        return Case(files, null=False, duty=repeat)
+        return Case(files[:k], null=False, duty=repeat, fresh=files[k:])
 
     return insist(once)
 
