@@ -54,7 +54,8 @@ def tell(*identifiers: str) -> None:
     for c in study.claims:
         if not set(identifiers) & set(c.ids):
             continue
-        verdict = {True: "-> holds", False: f"-> does not hold: {c.finding}", None: ""}[c.holds]
+        verdict = {"yes": "-> holds", "in part": f"-> holds in part: {c.finding}", "-": ""}.get(c.verdict)
+        verdict = f"-> does not hold: {c.finding}" if verdict is None else verdict
         paper = f"paper: {c.paper}" if c.paper else ""
         for line in (f"{', '.join(c.ids)}: {c.text}", paper, f"ours: {c.ours}", verdict):
             print(textwrap.fill(line, 88, subsequent_indent="    "), end="\n" if line else "")
@@ -62,7 +63,7 @@ def tell(*identifiers: str) -> None:
 
 
 judged = [c for c in study.claims if c.holds is not None]
-print(f"{sum(bool(c.holds) for c in judged)} of {len(judged)} claims hold on this machine")
+print(f"{sum(c.verdict == 'yes' for c in judged)} of {len(judged)} claims hold on this machine")
 
 # %%
 # 810 rows from five tests

@@ -30,6 +30,23 @@ ids = "C-35"
 text = "Rows"
 ours = "{rows:#}, {both}"
 
+[study.softer]
+ids = "C-35"
+text = "Smaller"
+paper = "half"
+ours = "{times:g}"
+holds = "times > ONE"
+softer = "Half in the paper, here {times:g}."
+whole = "times >= HALF"
+note = "Of ten rows."
+
+[study.reading]
+ids = "C-32"
+text = "Well"
+ours = "{times:g}"
+holds = "times > ONE"
+softer = "A figure only."
+
 [study.told]
 ids = "C-35"
 text = "Verdict of the facts"
@@ -43,7 +60,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     package.mkdir()
     (package / "__init__.py").touch()
     (package / "claims.toml").write_text(FILE, encoding="utf-8")
-    (package / "study.py").write_text("LIMIT = 1\n", encoding="utf-8")
+    (package / "study.py").write_text("LIMIT = 1\nONE, HALF = 1.0, 2.0\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     return importlib.import_module("small_paper.study")
 
@@ -59,13 +76,35 @@ def test_a_claim_is_judged_by_its_criterion_or_its_facts(study: ModuleType) -> N
     def _told(found: SimpleNamespace) -> Facts:
         return {"word": "so", "holds": np.bool_(found.cold < 1)}
 
-    cold, warm, rows, told = claims(SimpleNamespace(cold=0.5, rows=[1, 2, 3], both=True))
+    cold, warm, rows, *_, told = claims(SimpleNamespace(cold=0.5, rows=[1, 2, 3], both=True, times=1.5))
     assert (cold.ids, cold.text, cold.paper, cold.ours) == (("C-34", "C-36"), "It is small, cold", "1 um", "0.5 um")
     assert (cold.holds, cold.finding) == (True, "Of ten rows.")
     assert (warm.holds, warm.finding) == (False, "Of ten rows. The rest is noise.")
     assert (rows.ours, rows.holds, rows.finding) == ("3, shared by 1 claims", None, "")
     assert told.holds is True
     assert claims.judged("rows", SimpleNamespace(rows=[], both=False))[0].ours == "0, "
+
+
+@pytest.mark.parametrize(
+    ("times", "verdict", "finding", "reading"),
+    [
+        (0.9, "no", "Of ten rows.", "no"),
+        (1.9, "in part", "Half in the paper, here 1.9. Of ten rows.", "in part"),
+        (2.1, "yes", "Of ten rows.", "in part"),
+    ],
+)
+def test_a_criterion_softer_than_the_paper_holds_in_part(
+    study: ModuleType, times: float, verdict: str, finding: str, reading: str
+) -> None:
+    claims = Claims[SimpleNamespace](study.__name__)
+    (softer,) = claims.judged("softer", SimpleNamespace(times=times))
+    assert (softer.verdict, softer.finding) == (verdict, finding)
+    if reading == "no":
+        with pytest.raises(ValueError, match="needs a finding"):
+            claims.judged("reading", SimpleNamespace(times=times))
+        return
+    (read,) = claims.judged("reading", SimpleNamespace(times=times))
+    assert (read.verdict, read.softer) == (reading, True)
 
 
 def test_facts_of_no_claim_are_refused(study: ModuleType) -> None:

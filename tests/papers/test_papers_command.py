@@ -87,6 +87,7 @@ def test_some_for_programs(asked: list[tuple[str, int]], capsys: pytest.CaptureF
         "holds": True,
         "finding": "",
         "again": [True, True],
+        "softer": False,
     }
     assert second["holds"] is False
     assert numbers == {"rms_um": 1.25, "unknown_um": None}

@@ -51,6 +51,10 @@ def test_a_study_whose_claims_all_hold_is_green(study: Study) -> None:
     good = replace(study, claims=CLAIMS[:1])
     assert papers.headline(good) == "1 of 1 claims hold on the virtual machine"
     assert 'class="verdict good"' in papers.render([good], seed=0)
+    part = replace(study, claims=(CLAIMS[0], replace(CLAIMS[0], finding="Half in the paper.", softer=True)))
+    assert papers.headline(part) == "1 of 2 claims hold on the virtual machine, 1 in part"
+    assert 'class="verdict good"' not in papers.render([part], seed=0)
+    assert "holds: in part. Half in the paper." in papers.text(part)
 
 
 def test_plain_text(study: Study) -> None:

@@ -10,6 +10,9 @@ order of presentation:
 ``holds``
     Criterion: the name of a Boolean value, or two names and a comparison between them, such as ``"error <= LIMIT"``.
     Default: ``holds`` among the facts of the entry; if there is none, the claim is a number for information.
+``softer``, ``whole``
+    Why the criterion is softer than the paper's sentence or number: such a claim holds in part. If the second
+    criterion, that of the paper, is also fulfilled, it holds.
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.
 ``parts``
@@ -80,7 +83,12 @@ class Claims(Generic[_Found]):
         said = self._file.sentences(facts, found, entry.get("parts"))
         criterion = entry.get("holds", "holds" if "holds" in facts else "")
         holds = said.judge(criterion) if criterion else None
-        reasons = (entry.get("note", ""), entry.get("otherwise", "") if holds is False else "")
+        softer = bool(holds) and "softer" in entry and not (entry.get("whole") and said.judge(entry["whole"]))
+        reasons = (
+            entry["softer"] if softer else "",
+            entry.get("note", ""),
+            entry.get("otherwise", "") if holds is False else "",
+        )
         return Claim(
             ids=tuple(entry["ids"].split()),
             text=said.fill(entry["text"]),
@@ -88,4 +96,5 @@ class Claims(Generic[_Found]):
             ours=said.fill(entry["ours"]),
             holds=holds,
             finding=" ".join(filter(None, map(said.fill, reasons))),
+            softer=softer,
         )

@@ -100,7 +100,8 @@ def not_redone(name: str, why: str) -> Study:
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
     """Return a claim with the outcome of its other runs, and the finding where it does not hold."""
     same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
-    failed = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False]
-    otherwise = f"Seed {seed + APART * failed[0][0]}: {failed[0][1].finding}" if claim.holds and failed else ""
+    worse = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False or c.softer > claim.softer]
+    otherwise = f"Seed {seed + APART * worse[0][0]}: {worse[0][1].finding}" if claim.holds and worse else ""
     finding = " ".join(text for text in (claim.finding, otherwise) if text)
-    return replace(claim, finding=finding, again=tuple(c.holds for c in same if c.holds is not None))
+    again = tuple(c.holds for c in same if c.holds is not None)
+    return replace(claim, finding=finding, again=again, softer=any(c.softer for c in (claim, *same)))

@@ -37,9 +37,11 @@ class Claim:
     holds : bool or None
         Whether the claim is true here; None: a number for information, which cannot be false.
     finding : str
-        Reason why it does not hold, or its limitation. Required for every claim that does not hold.
+        Reason why it does not hold or holds in part only, or its limitation. Required for these claims.
     again : tuple of bool
         Whether it holds in further runs with other seeds, if the study was repeated.
+    softer : bool
+        The criterion by which it holds is softer than the paper's sentence or number, as `finding` states.
     """
 
     ids: tuple[str, ...]
@@ -49,18 +51,23 @@ class Claim:
     holds: bool | None
     finding: str = ""
     again: tuple[bool, ...] = ()
+    softer: bool = False
 
     @property
     def verdict(self) -> str:
-        """``yes`` or ``no``; ``2 of 3`` if runs disagree; ``-`` for a number for information."""
+        """``yes``, ``in part`` or ``no``; ``2 of 3`` if runs disagree; ``-`` for a number for information."""
         if self.holds is None:
             return "-"
         held = (self.holds, *self.again)
-        return ("yes" if self.holds else "no") if len(set(held)) == 1 else f"{sum(held)} of {len(held)}"
+        if len(set(held)) > 1:
+            return f"{sum(held)} of {len(held)}"
+        return ("in part" if self.softer else "yes") if self.holds else "no"
 
     def __post_init__(self) -> None:
-        if self.holds is False and not self.finding:
-            raise ValueError(f"{', '.join(self.ids)}: a claim that does not hold needs a finding that explains it")
+        if (self.holds is False or self.softer) and not self.finding:
+            raise ValueError(
+                f"{', '.join(self.ids)}: a claim that does not hold, or only in part, needs a finding that explains it"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,8 @@ from thermocomp.recordings.samples import Samples
 TERMS = {"x": 7, "y": 15, "z": 7}
 MAE_NET = {"x": 6.5, "y": 4.2, "z": 6.0}
 MAE_MRA = {"x": 8.9, "y": 3.8, "z": 6.9}
+#: printed: removals in the log of y (C-16)
+REMOVALS = 6
 #: printed: fit of x (C-19)
 R2_X, SEE_X = 0.988, 10.628
 #: Eq. 5 (C-18)
@@ -187,8 +189,10 @@ def _correlated(found: LearnedDrift) -> Facts:
 
 @claims.facts
 def _halved(found: LearnedDrift) -> Facts:
-    many = [t for t in DRIFTS if found.terms[t] > found.candidates[t] / 2]
-    return {"many": many, "holds": not many}
+    shares, paper = ({t: terms[t] / found.candidates[t] for t in DRIFTS} for terms in (found.terms, TERMS))
+    many = [t for t in DRIFTS if shares[t] > 0.5]
+    as_few = all(shares[t] <= paper[t] for t in DRIFTS)
+    return {"many": many, "holds": not many, "shares": shares, "paper_shares": paper, "as_few": as_few}
 
 
 @claims.facts
@@ -233,7 +237,10 @@ def _close(found: LearnedDrift) -> Facts:
     wide = [np.abs(common.residual(m, found.samples)).mean() for m in found.wide.values()]
     ratios = {t: found.net[t] / found.mra[t] for t in DRIFTS}
     apart = {t: r for t, r in ratios.items() if not 1 / COMPETITIVE <= r <= COMPETITIVE}
-    return {"apart": apart, "directions": list(apart), "wide_mae": wide, "holds": not apart}
+    printed = {t: MAE_NET[t] / MAE_MRA[t] for t in DRIFTS}
+    factor, paper = (max(max(r, 1 / r) for r in of.values()) for of in (ratios, printed))
+    facts: Facts = {"apart": apart, "directions": list(apart), "wide_mae": wide, "holds": not apart}
+    return facts | {"factor": factor, "paper_factor": paper}
 
 
 @claims.facts

@@ -49,8 +49,8 @@ CLOSELY = 0.973
 COMPETITIVE = 1.5
 #: minimum reduction of the RMS for a good prediction; the headline requires nine tenths (C-35)
 WELL = 0.8
-#: headline: accuracy improved by a factor of ten (C-35)
-TENFOLD = 10.0
+#: headline: accuracy improved by a factor of ten; printed: lateral errors 92.4 -> 7.2 um, depths 196 -> 8 um (C-35)
+TENFOLD, LATERAL, DEPTH = 10.0, 92.4 / 7.2, 196.0 / 8.0
 
 
 exhibits = Exhibits(__name__)

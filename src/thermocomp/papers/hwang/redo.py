@@ -61,7 +61,8 @@ def _representatives(c: Computed) -> Facts:
 def _fewer(c: Computed) -> Facts:
     sizes = [len(s.columns) for s in c.grouped.curve_]
     best = min(c.grouped.curve_, key=lambda s: s.mse)
-    return {"best": best, "variables": len(best.columns), "groups": len(c.grouped.groups_), "most": max(sizes)}
+    variables, groups = len(best.columns), len(c.grouped.groups_)
+    return {"best": best, "variables": variables, "groups": groups, "share": variables / groups, "most": max(sizes)}
 
 
 @claims.facts
@@ -106,7 +107,8 @@ def _collinearity(c: Computed) -> Facts:
     with_, without = c.grouped.spectrum_, c.single.spectrum_
     compared = [g.spectrum_.smallest > without.smallest for _, g in c.swept if g.selected_ != c.single.selected_]
     better = with_.smallest > without.smallest and with_.sum_inverse < without.sum_inverse
-    facts = {"with": with_, "without": without, "holds": better}
+    raised, paper = with_.smallest / without.smallest, setup.TABLE_3[0][-1] / setup.TABLE_3[1][-1]
+    facts = {"with": with_, "without": without, "holds": better, "raised": raised, "paper": paper}
     return facts | {"larger": sum(compared), "compared": len(compared), "others": True}
 
 

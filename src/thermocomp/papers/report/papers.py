@@ -25,18 +25,21 @@ COLUMNS, INDENT = 88, "    "
 
 
 def count_verdicts(study: Study) -> dict[str, int]:
-    """Return the number of claims by verdict: ``yes``, ``no``, ``some`` (runs disagree) and ``-``."""
-    words = [c.verdict if c.verdict in ("yes", "no", "-") else "some" for c in study.claims]
-    return {word: words.count(word) for word in ("yes", "no", "some", "-")}
+    """Return the number of claims by verdict: ``yes``, ``in part``, ``no``, ``some`` (runs disagree) and ``-``."""
+    known = ("yes", "in part", "no", "some", "-")
+    words = [c.verdict if c.verdict in known else "some" for c in study.claims]
+    return {word: words.count(word) for word in known}
 
 
 def headline(study: Study) -> str:
     """Return a summary line of a study: the number of claims that hold."""
     n = count_verdicts(study)
     runs = max((1 + len(c.again) for c in study.claims), default=1)
-    line = f"{n['yes']} of {n['yes'] + n['no'] + n['some']} claims hold on the virtual machine"
+    line = f"{n['yes']} of {sum(n.values()) - n['-']} claims hold on the virtual machine"
     if runs > 1:
         line += f" in each of {runs} runs"
+    if n["in part"]:
+        line += f", {n['in part']} in part"
     if n["some"]:
         line += f", {n['some']} in some of them"
     return f"{line}; {n['-']} more number{'s' if n['-'] > 1 else ''} next to the paper's" if n["-"] else line

@@ -47,7 +47,8 @@ def _first(c: Computed) -> Facts:
 def _few(c: Computed) -> Facts:
     log = c.selection.log_
     facts = {"places": list(map(_place, c.chosen)), "any": bool(log), "fewest": c.thinned[-1]}
-    facts |= {"holds": 1 <= len(c.chosen) <= setup.PAPERS_COUNT}
+    few, as_many = 1 <= len(c.chosen) <= setup.PAPERS_COUNT, len(c.chosen) == setup.PAPERS_COUNT
+    facts |= {"holds": few, "as_many": as_many}
     return facts | ({"last": log[-1], "explained": F_ENTER / (F_ENTER + log[-1].df)} if log else {})
 
 

@@ -156,7 +156,8 @@ def _enough(s: Selection) -> Facts:
 def _several(s: Selection) -> Facts:
     common = s.small.common
     shown = " ".join(map(name_set, common[:6])) + (" ..." if len(common) > 6 else "")
-    facts: Facts = {"shown": shown or "none", "holds": len(common) > 0}
+    several = len(common) > 1 and bool((s.small.equivalent.sum(axis=1) > 1).all())  # the best is equal to itself
+    facts: Facts = {"shown": shown or "none", "holds": several}
     for name, found in (("small", s.small), ("holm", s.holm), ("converged", s.converged)):
         facts |= {f"counts_{name}": True, f"equivalent_{name}": found.equivalent.sum(axis=1)}
     return facts

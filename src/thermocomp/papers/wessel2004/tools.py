@@ -34,6 +34,9 @@ from thermocomp.virtual.protocol import Physics
 #: largest local gain over linear regression (E-W1); accuracy in the milling test without one episode [um] (E-W2)
 PAPER_GAIN, PAPER_ACCURACY = 10.0, 2.0
 
+#: printed: RMS by linear regression over that by ACE, of the resting tool (W-08) and of the working machine (W-09)
+AT_REST, AT_WORK = 5.7 / 1.0, 5.0 / 2.2
+
 # Criteria of the claims, defined before the first run:
 #: number of intervals of the test in which the largest local gain is sought
 STRETCHES = 10
