@@ -391,7 +391,6 @@ def test_sets_are_written_like_the_papers() -> None:
     assert wessel2004_sets.name_set((0, 1, 7)) == "{T1, T2, T8}"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("physics", ["linear", "nonlinear"])
 @pytest.mark.parametrize(
     ("row", "experiment", "target", "temperatures"),
