@@ -447,3 +447,39 @@ def test_a_model_file_of_an_earlier_version_has_the_limits_of_its_time() -> None
     assert found.watch.repeats == 1.0
     assert np.array_equal(found.watch.limits("frozen"), found.watch.limits("moved"))
     assert "frozen" not in modelfile.dumps([found])  # nor does its state belong to another model
+
+
+# -- from the first reading on ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("names", [SIX, ()], ids=["six", "all"])
+def test_values_that_never_change_from_the_start_are_found(names: tuple[str, ...]) -> None:
+    """A gateway that delivers its last values since before the start, while the speed is that of the machine."""
+    model = fitted(names)
+    day = virtual.record("demo", seed=7)[0]
+    table = day.table[names_of(model)].to_numpy(np.float64)[:1500]
+    heat = [k for k, name in enumerate(names_of(model)) if name.endswith("_C")]
+    frozen = table.copy()
+    frozen[:, heat] = table[0, heat]
+    runs = day.time[np.flatnonzero(table[:, -1] > 0)[0]]
+    said = [said for _, said in go(Compensator.of([model]), rows_of(day.time[:1500], frozen, names_of(model)))]
+    found = [t for t, one in zip(day.time.tolist(), said, strict=False) if stopped(one)]
+    assert runs < found[0] <= runs + 1800.0
+    assert stopped(said[-1])
+    assert said[-1].states["z_um"].word == "fading"
+    assert not any(one.failed for one in said)
+    sound = [said for _, said in go(Compensator.of([model]), rows_of(day.time[:1500], table, names_of(model)))]
+    assert not any(stopped(one) for one in sound)
+
+
+@pytest.mark.parametrize("updates", [600.0, 900.0])
+def test_a_source_that_is_slow_from_the_start_has_not_stopped_for_long(updates: float) -> None:
+    """Values every ten minutes: until the second one it may be taken for a source that has stopped, then it is not."""
+    model = fitted(())
+    day = virtual.record("demo", seed=7)[0]
+    table = day.table[names_of(model)].to_numpy(np.float64)[:1500].copy()
+    heat = [k for k, name in enumerate(names_of(model)) if name.endswith("_C")]
+    held = (day.time[:1500] // updates * updates / (day.time[1] - day.time[0])).astype(int)
+    table[:, heat] = table[held][:, heat]
+    said = [said for _, said in go(Compensator.of([model]), rows_of(day.time[:1500], table, names_of(model)))]
+    assert not any(stopped(one) for one in said[int(updates / 20) + 1 :])

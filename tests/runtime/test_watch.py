@@ -332,6 +332,45 @@ def test_a_coarse_sensor_at_rest_for_days_is_not_stuck(samples: Samples) -> None
     assert not names
 
 
+@pytest.mark.parametrize("minutes", [10, 30, 120])
+def test_a_value_that_is_the_same_after_a_gap_is_not_stuck(minutes: int) -> None:
+    """Half an hour of readings, then none: of 0.02 degC, after a gap one in some reads the same by chance."""
+    whole = stack(virtual.record("demo"), ["z_um"])
+    found = find_watch(whole.take(np.arange(len(whole)) % 3 == 0), np.ones((len(whole) + 2) // 3, np.bool_))
+    assert found is not None
+    heat = [k for k, c in enumerate(whole.inputs) if c.quantity == "temperature"]
+    values = whole.values.copy()
+    values[:, heat] = np.round(values[:, heat] / 0.02) * 0.02
+    known = whole.time % (60.0 * (30 + minutes)) < 1800.0
+    stuck, repeats = 0, 0
+    for shift in range(3):  # three starts of the gaps
+        state, last = begin(found), values[0]
+        for k in np.flatnonzero(np.roll(known, 40 * shift)).tolist():
+            repeats += int(whole.time[k] - state.time > 600.0 and (values[k] == last)[heat].any())
+            state, last = (
+                look(found, state, float(whole.time[k]), values[k], resting=bool(whole.stands[k]))[0],
+                values[k],
+            )
+        stuck += np.count_nonzero(state.fault == STUCK)
+    assert repeats or minutes == 10
+    assert stuck == 0
+
+
+def test_a_stuck_sensor_is_found_at_any_interval(watch: Watch, samples: Samples) -> None:
+    for every in (1, 10, 20):  # [min]
+        some = samples.take(np.arange(len(samples)) % every == 0)
+        values = some.values.copy()
+        row = np.flatnonzero(some.time > 40_000.0)[0]
+        values[row:, 0] = values[row, 0]
+        state = begin(watch)
+        for k, time in enumerate(some.time.tolist()):
+            state, _ = look(watch, state, time, values[k], resting=bool(some.stands[k]))
+            if state.fault[0] == STUCK:
+                break
+        assert state.fault.tolist() == [STUCK, 0, 0, 0, 0, 0]
+        assert time < some.time[row] + 4 * 3600.0
+
+
 def test_a_file_holds_one_watch_for_all_its_models(watch: Watch, samples: Samples) -> None:
     models = [judged(train("ols", samples, k, samples.cycle != 3).model, watch, {SIX[0]: 2.0}) for k in (0, 1)]
     text = modelfile.dumps(models)

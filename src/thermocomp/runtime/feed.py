@@ -129,11 +129,13 @@ class TemperatureFeed:
             return feed._replace(predicted=()), ""
         if not feed.predicted:
             return feed._replace(predicted=tuple(s.predicted for s in states)), ""
-        if not feed.changes or feed.repeated <= self._thresholds.repeat_wait * feed.usual:
+        if feed.repeated <= self._thresholds.repeat_wait * feed.usual:
             return feed, ""
         of = zip(self._watches, states, feed.predicted, self.places, strict=True)
         for watch, state, before, places in of:
             moved, steps = state.predicted - before, np.array([feed.steps[p] for p in places])
+            if not feed.changes:  # nothing has changed yet: the resolution is that of the training
+                steps = np.zeros(len(places))
             least = np.maximum(watch.limits("frozen"), self._thresholds.repeat_moved * steps)
             far = (state.fault == GOOD) & (np.abs(moved) > least)
             if far.any():

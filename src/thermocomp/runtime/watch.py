@@ -221,7 +221,7 @@ def _step(
     taus = np.repeat(watch.time_constants, len(watch.sensors))
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
-    s, stuck = _stuck(watch, s, x, calm)
+    s, stuck = _stuck(watch, s, x, calm, dt)
     over = np.abs(np.where(calm, difference, 0.0) / find_limits(watch, memory)) > 1.0
     far = np.asarray(over.any(axis=-1, keepdims=True))
     found, wrong = heat.check(watch, s.heat, speeds, used, memory, (time, dt), failed, far, _last_change(s, calm))
@@ -267,8 +267,12 @@ def _missing(s: WatchState, seen: BoolArray) -> WatchState:
     )
 
 
-def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple[WatchState, BoolArray]:
-    """Find sensors that are constant although their prediction moves, or for too long while others change."""
+def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray, dt: float) -> tuple[WatchState, BoolArray]:
+    """Find sensors that are constant although their prediction moves, or for too long while others change.
+
+    Between two readings at most `fault_duration` counts: after a gap, a value may be the same by chance.
+    """
+    gap = max(dt - watch.thresholds.fault_duration, 0.0)
     same = x == s.same
     if not same.any():
         nan = np.full(x.shape, np.nan)
@@ -278,7 +282,7 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray) -> tuple
     fresh = ~same
     s = s._replace(
         same=np.where(fresh, x, s.same),
-        still=np.where(fresh, s.time, s.still),
+        still=np.where(fresh, s.time, s.still + gap),
         then=np.where(fresh, s.predicted, s.then),
     )
     moves = same & calm & (apart > watch.limits("moved"))

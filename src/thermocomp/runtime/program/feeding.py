@@ -81,10 +81,11 @@ def compare_predictions(s: Kept, w: Work, t: Constants) -> None:
             for i in each("i", t.SENSORS):
                 s.feed_predicted[i] = s.predicted[i]
             s.feed_known = s.looked
-        with otherwise_when((s.feed_changes > 0.0) & (s.repeated > t.repeat_wait * s.feed_usual)):
+        with otherwise_when(s.repeated > t.repeat_wait * s.feed_usual):
             for i in each("i", t.SENSORS):
                 moved = let("moved", abs(s.predicted[i] - s.feed_predicted[i]))
-                least = let("least", t.repeat_moved * s.feed_step[t.feed_place[i]])
+                step = let("step", choose(s.feed_changes > 0.0, s.feed_step[t.feed_place[i]], 0.0))
+                least = let("least", t.repeat_moved * step)
                 with when(s.fault[i].equals(GOOD) & (moved > t.frozen_limit[i]) & (moved > least)):
                     s.feed_moved = True
             with when(s.feed_moved):

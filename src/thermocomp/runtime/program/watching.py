@@ -184,7 +184,7 @@ def look(s: Kept, w: Work, t: Constants) -> None:
         for i in each("i", t.SENSORS):
             inner = let("inner", choose(w.calm[i], w.difference[i], 0.0))
             s.traces[k * t.SENSORS + i] = follow(s.traces[k * t.SENSORS + i], inner, elapsed / t.tau[k])
-    find_stuck(s, w, t)
+    find_stuck(s, w, t, elapsed)
     find_over(s, w, t)
     with when(t.supervised):
         heating.check_speeds(s, w, t, elapsed)
@@ -230,9 +230,10 @@ def advance(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
 
 
 @procedure
-def find_stuck(s: Kept, w: Work, t: Constants) -> None:
+def find_stuck(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     """Find sensors with constant readings although the prediction, or for too long another sensor, has changed."""
     lives = let("lives", flag(False))
+    gap = let("gap", choose(elapsed > t.fault_duration, elapsed - t.fault_duration, 0.0))
     for i in each("i", t.SENSORS):
         same = let("same", w.there[i] & s.read_once[i] & w.x[i].equals(s.same[i]))
         w.changed[i] = ~same
@@ -240,8 +241,7 @@ def find_stuck(s: Kept, w: Work, t: Constants) -> None:
             lives.set(True)
     w.last_change = -1e30
     for i in each("i", t.SENSORS):
-        with when(w.changed[i]):
-            s.still[i] = w.now
+        s.still[i] = choose(w.changed[i], w.now, s.still[i] + gap)
         with when(w.calm[i] & (s.still[i] > w.last_change)):
             w.last_change = s.still[i]
     for i in each("i", t.SENSORS):
