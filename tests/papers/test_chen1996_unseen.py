@@ -28,7 +28,7 @@ Weights = Mapping[str, float]
 def made(truth: Weights) -> Samples:
     """Return a test in which x, y and z are the same sum of temperature changes; each temperature rises in its way."""
     n = 200
-    time = 360.0 * np.arange(n)
+    time = 360.0 * np.arange(n, dtype=np.float64)
     courses = {t: 20 + (k + 2) * (1 - np.exp(-np.arange(n) / (10.0 * k + 20))) for k, t in enumerate(TEMPERATURES)}
     drift = sum((w * (courses[t] - courses[t][0]) for t, w in truth.items()), start=np.zeros(n))
     table = pd.DataFrame({**courses, "speed": np.full(n, 1250.0), **dict.fromkeys(DRIFTS, drift)})
