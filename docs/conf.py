@@ -24,6 +24,7 @@ extensions = [
     "cli_run",
     "code_table",
     "component_table",
+    "erratum_table",
     "method_table",
     "requirement_table",
     "myst_parser",

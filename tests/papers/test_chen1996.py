@@ -258,22 +258,6 @@ def test_a_net_that_knows_the_truth_fulfils_them(unseen: Unseen) -> None:
     assert not any(c.holds for c in claims if "C-34" in c.ids)  # both lose nothing: the net does not degrade less
 
 
-def test_the_one_that_uses_the_lost_sensor_degrades(unseen: Unseen) -> None:
-    """C-34: by the same two models, the regression or the net depends on T2."""
-    heat = unseen.learned.samples
-    on_t2, on_t3 = (
-        {
-            t: common.fit_and_freeze(SecondOrderRegression(subset=[s], second_order=False), heat.only([s]), [t])[t]
-            for t in "xyz"
-        }
-        for s in ("T2", "T3")
-    )
-    for models, of_nets, holds in ((on_t2, on_t3, True), (on_t3, on_t2, False)):
-        nets = [replace(n, models=of_nets) for n in unseen.learned.nets]
-        claims = chen1996_unseen.claims(replace(unseen, learned=replace(unseen.learned, models=models, nets=nets)))
-        assert find(claims, "C-34", "z, 1250").holds is holds
-
-
 # -- slopes --------------------------------------------------------------------------------------------------------
 
 

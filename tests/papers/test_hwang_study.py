@@ -42,6 +42,13 @@ def test_it_covers_its_requirements(study: Study, told: list[float]) -> None:
     assert all(np.isfinite(v) for v in study.numbers.values())
 
 
+def test_a_hundred_draws_of_the_noise(study: Study) -> None:
+    # H-18
+    (figure,) = [f for f in study.figures if f.key == "hwang-fig6"]
+    assert [len(curve.x) for panel in figure.panels for curve in panel.curves] == [100, 100]
+    assert [len(np.unique(curve.y)) for panel in figure.panels for curve in panel.curves] == [100, 100]
+
+
 def test_numbers_of_models(study: Study) -> None:
     # H-07
     n = study.numbers

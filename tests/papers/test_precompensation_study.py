@@ -1,6 +1,8 @@
 """The study of pre-compensation: its procedure, and that its claims can fail."""
 
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,10 +11,12 @@ from numpy.typing import NDArray
 
 from thermocomp.core.machine import Channel
 from thermocomp.models.arx import ARX
-from thermocomp.papers.common import fit_and_freeze
+from thermocomp.models.arx_net import NetARX
+from thermocomp.papers.common import fit_and_freeze, rms
 from thermocomp.papers.precompensation import cutting
 from thermocomp.papers.precompensation import redo as precompensation
 from thermocomp.papers.precompensation import setup as precompensation_setup
+from thermocomp.papers.precompensation.setup import at_positions
 from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recordings.cycles import find_cycles
 from thermocomp.recordings.recording import Recording
@@ -120,6 +124,36 @@ def test_a_room_that_changes_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None
     assert claim(study, "P-07").holds is False
     assert claim(study, "P-06", "P-07").holds is False
     assert study.numbers["room_peak_to_peak_um"] > 20
+
+
+def test_the_verification_is_another_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    """P-05: learned from the first test, judged in the second, with other speeds."""
+    monkeypatch.setattr(precompensation_setup, "record", lambda e, *, seed: made(e, seed=seed))
+    monkeypatch.setattr(precompensation_setup, "NetARX", partial(NetARX, hidden=2, epochs=20))
+    monkeypatch.setattr(precompensation_setup, "CUTS", 1)
+    monkeypatch.setattr(precompensation_setup, "INTERVALS", (600.0,))
+    c = precompensation_setup.compute(0, tell_nobody)
+    identification, verification = made("precompensation", seed=0)
+    for samples, test in ((c.learn, identification), (c.judge, verification)):
+        np.testing.assert_array_equal(samples.values[:, 0], test.table["spindle_rpm"])
+        measured = np.column_stack([test.table[f"z_at_{p}_um"] for p in precompensation_setup.POSITIONS])
+        np.testing.assert_allclose(np.diff(samples.deviations, axis=0), np.diff(measured, axis=0), atol=1e-9)
+    # what is judged is the drift of the second test, and least squares predicts it without having seen it
+    np.testing.assert_array_equal(c.left[precompensation_setup.NONE], c.judge.deviations)
+    assert c.errors[precompensation_setup.LEAST].rms < 0.1 * c.errors[precompensation_setup.NONE].rms
+    fitted = at_positions(c.models[precompensation_setup.LEAST], c.learn)
+    assert rms(c.learn.deviations - fitted) < 0.1 * rms(c.learn.deviations)
+
+
+@pytest.mark.parametrize(("after", "holds"), [(0.27, True), (0.3, False), (0.9, False)])
+def test_the_depth_must_shrink_as_in_the_paper(after: float, holds: bool) -> None:
+    """P-07: 7 -> 2 um."""
+    found = SimpleNamespace(
+        depths=(20.0, 20.0 * after),
+        cuts=[precompensation_setup.CuttingTest(np.full(4, 20.0), np.full(4, 20.0 * after))],
+    )
+    (claim,) = precompensation.claims.judged("depth", found)  # type: ignore[arg-type]
+    assert claim.holds is holds
 
 
 def test_what_is_added_to_the_program_is_minus_the_deviation() -> None:

@@ -1,12 +1,14 @@
 """The study of stepwise2017: its procedure, and that its claims can fail."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from smallmachine import small_machine
 
+from thermocomp.papers.common import Errors
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
@@ -91,3 +93,50 @@ def test_sliced_inverse_regression_finds_the_direction() -> None:
     model = stepwise2017_setup.sliced_inverse(samples)
     found = np.array([model.coefficients_by_name().get(n, 0.0) for n in names])
     assert np.corrcoef(X @ found, X @ w)[0, 1] > 0.995
+
+
+def test_sliced_inverse_regression_takes_the_leading_directions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """T-10: the slices differ most in the first direction; of many, the last ones hold nothing of the deviation."""
+    monkeypatch.setattr(stepwise2017_setup, "DIRECTIONS", 1)
+    (test,) = record("stepwise2017", seed=0)
+    rng = np.random.default_rng(1)
+    names = [c.name for c in test.temperatures]
+    X = rng.normal(size=(len(test), len(names)))
+    table = test.table.assign(**dict(zip(names, X.T, strict=True)), x1_um=10 * X[:, 3] + 5 * X[:, 7])
+    samples = stack([replace(test, table=table)], ["x1_um"], names)
+    model = stepwise2017_setup.sliced_inverse(samples)
+    found = np.array([model.coefficients_by_name().get(n, 0.0) for n in names])
+    assert found[[3, 7]] == pytest.approx([10, 5], abs=1)
+    assert np.abs(np.delete(found, [3, 7])).max() < 1
+
+
+def test_the_online_test_is_another_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    """T-09: learned from one experiment, judged on the other."""
+    asked: list[str] = []
+
+    def made(experiment: str, *, seed: int) -> list[Recording]:
+        asked.append(experiment)
+        return _of(experiment, seed, few=True)
+
+    monkeypatch.setattr(stepwise2017_setup, "record", made)
+    monkeypatch.setattr(stepwise2017_setup, "THINNED", (1,))
+    c = stepwise2017_setup.compute(0, tell_nobody)
+    assert asked == ["stepwise2017", "stepwise2017-online"]
+    for samples, name in zip((c.fit, c.online), asked, strict=True):
+        (test,) = _of(name, 0, few=True)
+        changes = np.diff(test.table["x1_um"])
+        np.testing.assert_allclose(np.diff(samples.deviations[:, 0]), changes, atol=1e-9)
+    # what is judged is the error in the second
+    np.testing.assert_array_equal(c.left[stepwise2017_setup.NONE], c.online.deviations[:, 0])
+    np.testing.assert_array_equal(c.left_in_fit[stepwise2017_setup.NONE], c.fit.deviations[:, 0])
+
+
+@pytest.mark.parametrize(("size", "holds"), [(6.0, False), (4.0, True)])
+def test_the_bound_is_five_um(size: float, holds: bool) -> None:
+    """T-08: of a drift of 30 um everything is left but one reading, which stays within the bound or not."""
+    x = np.linspace(0.0, 30.0, 60)
+    left = np.where(np.arange(60) == 30, size, 0.5)
+    errors = {stepwise2017_setup.NONE: Errors.of(x), stepwise2017_setup.STEPWISE: Errors.of(left)}
+    found = SimpleNamespace(errors=errors, left={stepwise2017_setup.STEPWISE: left}, fitted=Errors.of(left))
+    (claim,) = stepwise2017.claims.judged("bounded", found)  # type: ignore[arg-type]
+    assert claim.holds is holds

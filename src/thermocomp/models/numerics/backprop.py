@@ -102,6 +102,9 @@ def train_net(
 ) -> TrainedNet:
     """Train a net with sigmoids in both layers by backpropagation (C-25 to C-30).
 
+    The squared error between outputs and targets is what the weights reduce; the sentence of the paper that says so is
+    incomplete (E-C11).
+
     The function releases the interpreter lock (GIL), so that nets can be trained in threads.
 
     Parameters

@@ -141,7 +141,7 @@ class StepwiseStep:
     term : str
         Name of the term.
     f : float
-        Partial F of the term, in the model that contains it (T-02).
+        Partial F of the term, in the model that contains it (T-02; the symbols of Eq. 1: E-T1).
     df : int
         Residual degrees of freedom of that model.
     alpha : float

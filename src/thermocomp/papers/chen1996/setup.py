@@ -11,7 +11,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
 
-#: Table 1 (C-11): symbol -> channel of the virtual machine
+#: Table 1 (C-11): symbol -> channel of the virtual machine; the indices 4 and 9 are misread in the scan (E-C8)
 SENSORS = {
     "T1": "t_air_C",
     "T2": "t_housing_C",

@@ -30,11 +30,11 @@ from thermocomp.virtual.kits import HWANG_PLACES
 NAMES = tuple(f"T{k}" for k in range(1, 15))
 REFERENCE = "T14"
 TARGET = "z_um"
-#: groups of the paper (Table 1, H-10)
+#: groups of the paper (Table 1, H-10); of its underlined representatives only four are known, from the text (E-H4)
 TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
 #: variables of the best model (H-11) relative to these groups
 PAPERS_SHARE = 4 / 8
-#: eigenvalues in Table 3 of the paper (H-16): with and without grouping
+#: eigenvalues in Table 3 of the paper (H-16): with and without grouping, Eq. 6 and 8 despite its header (E-H5)
 TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
 #: temperatures of the engineering judgement model, which also uses their squares (H-13)
 JUDGEMENT = ("T6", "T7", "T13")

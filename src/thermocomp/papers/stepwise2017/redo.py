@@ -14,7 +14,7 @@ from thermocomp.papers.stepwise2017.setup import F_ENTER, LEAST, PAPERS_RESIDUAL
 from thermocomp.papers.study import Figure, Part, Progress, Study, StudyTable
 
 TITLE = "Open Mech. Eng. J. 11 (2017): Temperature measurement point optimization by stepwise regression"
-#: numbers of the temperatures in Fig. 2 of the paper
+#: numbers of the temperatures in Fig. 2 of the paper, whose description is not used (E-T6)
 FIGURE_2 = (3, 11, 14)
 
 

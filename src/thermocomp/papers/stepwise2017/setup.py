@@ -17,7 +17,7 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
 
 TARGET = "x1_um"
-#: F to enter and F to delete (T-03)
+#: F to enter, whose symbol is missing in the text (E-T1), and F to delete (T-03)
 F_ENTER, F_DELETE = 100.0, 50.0
 #: number of temperatures kept in the paper's model, out of 24 (T-07); its bound on the residual [um] (T-08)
 PAPERS_COUNT = 5

@@ -31,7 +31,8 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.protocol import Physics
 
-#: largest local gain over linear regression (E-W1); accuracy in the milling test without one episode [um] (E-W2)
+#: largest local gain over linear regression (E-W1), of the RMS "failure", i.e. error (E-W7); accuracy in the milling
+#: test without one episode [um] (E-W2)
 PAPER_GAIN, PAPER_ACCURACY = 10.0, 2.0
 
 #: printed: RMS by linear regression over that by ACE, of the resting tool (W-08) and of the working machine (W-09)
