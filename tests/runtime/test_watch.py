@@ -351,7 +351,7 @@ def test_a_value_that_is_the_same_after_a_gap_is_not_stuck(minutes: int) -> None
                 look(found, state, float(whole.time[k]), values[k], resting=bool(whole.stands[k]))[0],
                 values[k],
             )
-        stuck += np.count_nonzero(state.fault == STUCK)
+        stuck += int(np.count_nonzero(state.fault == STUCK))
     assert repeats or minutes == 10
     assert stuck == 0
 
