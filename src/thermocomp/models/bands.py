@@ -11,6 +11,8 @@ from thermocomp.core.band import CONFORMAL, Band
 
 #: share of the rows of unseen cycles that a band should cover
 LEVEL = 0.9
+#: relative increase of the half-width per unit of distance outside the joint support
+WIDENING = 0.33
 #: minimum spread used, relative to its root mean square on the left-out cycles
 FLOOR = 0.5
 _LEAST = 1e-6  # lower limit of divisors [unit], and of a size relative to that
@@ -69,7 +71,16 @@ def find_band(
     else:
         factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt(1 + 1 / n))
     running, stopped = (max(factor * size, _LEAST) for size in (running, stopped))
-    return Band(level=level, basis=basis, cycles=n, floor=floor, running=running, stopped=stopped, speeds=tuple(speeds))
+    return Band(
+        level=level,
+        basis=basis,
+        cycles=n,
+        floor=floor,
+        running=running,
+        stopped=stopped,
+        speeds=tuple(speeds),
+        widening=WIDENING,
+    )
 
 
 def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:
