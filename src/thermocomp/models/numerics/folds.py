@@ -41,6 +41,8 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
     return folds, f"{number + 1} thermal cycles, left out in turn"
 
 
+#: fewest cycles of which neighbours can be left out together
+APART = 5
 #: most neighbours on each side that are left out together with a thermal cycle
 _MOST_NEIGHBOURS = 2
 
@@ -49,7 +51,7 @@ def find_neighbours(folds: IntArray, step: FloatArray) -> BoolArray:
     """Return which folds are left out together to estimate the error in later use.
 
     Successive cycles of a recording share the state of a warm-up, the weather and the zero; one that is predicted by
-    its neighbours is known better than a later one will be. With five folds or more, the neighbours in the same
+    its neighbours is known better than a later one will be. With `APART` folds or more, the neighbours in the same
     recording are left out too: up to a quarter of the other folds on each side.
 
     Parameters
@@ -65,7 +67,7 @@ def find_neighbours(folds: IntArray, step: FloatArray) -> BoolArray:
         Row k: folds left out to predict fold k.
     """
     order = np.arange(int(folds.max()) + 1)
-    reach = min(_MOST_NEIGHBOURS, (len(order) - 1) // 4)
+    reach = min(_MOST_NEIGHBOURS, (len(order) - 1) // (APART - 1))
     recording = np.cumsum(np.isinf(step))[[int(np.argmax(folds == k)) for k in order]]
     apart = np.abs(order[:, None] - order)
     return np.asarray((apart == 0) | ((apart <= reach) & (recording[:, None] == recording)))
