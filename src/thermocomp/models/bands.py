@@ -32,8 +32,9 @@ def find_band(
     The error is expressed in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between a running
     and a stopped spindle. Errors within a cycle are dependent, so n cycles count as n independent values. The size for
     one further cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom, with
-    fewer than `APART` cycles times sqrt(1 + 1/n), since their neighbours were not left out. From `CONFORMAL` cycles onwards, the only assumption is that the cycles are exchangeable: the
-    quantile of the errors, with equal weight for each cycle and for one additional unknown cycle.
+    fewer than `APART` cycles times sqrt(1 + 1/n), since their neighbours were not left out. From `CONFORMAL` cycles
+    onwards, the only assumption is that the cycles are exchangeable: the quantile of the errors, with equal weight for
+    each cycle and for one additional unknown cycle.
 
     Parameters
     ----------
