@@ -5,8 +5,8 @@ Run with ``python benchmarks/bench_bands.py [--recordings 200] [--jobs 2] [--phy
 random (speeds, feeds, durations of run and standstill, weather by seed), the first 3, 5 or 10 cycles are for
 training and three more for validation, by a replay of the frozen model; all 24 sensors, or some of the usual 16 drawn
 at random. With ``--use harder`` the warm-up goes on (short stops), speeds may lie outside the trained ones, and three
-cycles of a later day are judged too, in other weather and from another state of the machine (`bands_harder`). The error
-on unseen cycles is also compared with that on cycles left out, as a model file states it. Then, if the measured data
+cycles of a later day are judged too, in other weather and from another state of the machine (`bands_harder`). With
+``--honest`` the error on unseen cycles is compared with the one that a model file states. Then, if the measured data
 are available, fl_thermal: rows 0-6668, each cycle left out in turn.
 """
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from bands_harder import choose_sensors, draw_harder
 from measured import find_measured
 from thermocomp.judging.replay import replay_compensated
+from thermocomp.judging.splits import leave_one_cycle_out
 from thermocomp.models.training import train
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.samples import Samples
@@ -49,7 +50,7 @@ class Held(NamedTuple):
     coverage: float
     half_width: float  #: mean [um]
     rms: float  #: of the error [um]
-    stated: float  #: RMS error on the training cycles, each left out; nan if not computed [um]
+    stated: float  #: RMS error that a model file states; nan if not computed [um]
     words: str
 
 
@@ -69,13 +70,12 @@ def protocol(rng: np.random.Generator, cycles: int) -> str:
     return "\n".join(lines)
 
 
-def left_out_error(samples: Samples, target: int, learn: NDArray[np.bool_]) -> float:
-    """Return the RMS error on the training cycles, each left out and predicted by a model of the others."""
-    errors = []
-    for cycle in np.unique(samples.cycle[learn]):
-        mine = samples.cycle == cycle
-        model = train("averaged", samples, target, learn & ~mine, joint=False).model
-        errors.append(replay_compensated(model, samples, mine).deviation - samples.deviations[mine, target])
+def stated_error(samples: Samples, target: int, learn: NDArray[np.bool_]) -> float:
+    """Return the RMS error that a model file states: on the training cycles, each left out in turn."""
+    known, errors = samples.take(learn), []
+    for split in leave_one_cycle_out(known).splits:
+        model = train("averaged", known, target, split.learn, joint=False).model
+        errors.append(replay_compensated(model, known, split.judge).deviation - known.deviations[split.judge, target])
     return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
@@ -89,7 +89,7 @@ def hold(samples: Samples, target: int, learn: NDArray[np.bool_], *, honest: boo
         float((np.abs(error) <= found.half_width).mean()),
         float(found.half_width.mean()),
         float(np.sqrt((error**2).mean())),
-        left_out_error(samples, target, learn) if honest else float("nan"),
+        stated_error(samples, target, learn) if honest else float("nan"),
         model.band.words if model.band else "no band",
     )
 
@@ -181,7 +181,7 @@ def main() -> int:
     parser.add_argument("--sensors", type=int, nargs="+", default=[0], help="drawn of the usual 16; 0: all 24")
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--cycles", type=int, nargs="+", choices=LEARNED, default=LEARNED, help="of the training")
-    parser.add_argument("--honest", action="store_true", help="also compute the error on left-out cycles")
+    parser.add_argument("--honest", action="store_true", help="also compute the error that a file states")
     options = parser.parse_args()
     reached, seeds = True, range(options.first, options.first + options.recordings)
     for cycles in options.cycles:
