@@ -9,6 +9,7 @@ import pytest
 from thermocomp.core.band import Band
 from thermocomp.core.exceptions import SettingError
 from thermocomp.core.inputs import Input, Support
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.files import modelfile
 
@@ -66,6 +67,18 @@ def test_the_band_is_the_spread_of_the_parts() -> None:
     lagged, paced = 4.0 * -np.expm1(-0.5), 0.25 * -np.expm1(-300.0 * (0.5 / 3600 + 0.5 / 1200))
     spread = np.hypot(0.1 * 4.0 + 0.2 * lagged + 3.0 * paced, 4.0 * paced)
     assert MODEL.half_width(state, reading) == pytest.approx(2.0 * np.hypot(1.0, spread), rel=1e-12)
+
+
+@pytest.mark.parametrize(("away", "wider"), [(0.5, 1.0), (1.0, 1.0), (3.0, 2.0), (5.0, 3.0), (9.0, 3.0)])
+def test_the_band_is_wider_far_from_the_training(away: float, wider: float) -> None:
+    assert MODEL.band is not None
+    joint = JointSupport((0,), (2.0,), ((0.0,),), 1.0)  # a distance of 1 is 2 degC
+    far = replace(MODEL, band=replace(MODEL.band, widening=0.5), joint=joint)
+    table = {"T": np.array([20.0, 20.0 + 2.0 * away]), "n": np.array([0.0, 3000.0])}
+    plain, found = MODEL.half_widths(table, [0.0, 300.0]), far.half_widths(table, [0.0, 300.0])
+    assert found == pytest.approx(plain * [1.0, wider], rel=1e-12)
+    assert replace(far, joint=None).half_widths(table, [0.0, 300.0]) == pytest.approx(plain, rel=1e-12)
+    assert modelfile.loads(modelfile.dumps([far])) == (far,)
 
 
 @pytest.mark.parametrize("policy", ["hold", "fade"])
@@ -141,6 +154,8 @@ def test_numbers_that_do_not_fit_are_refused(change: dict[str, Any], says: str) 
         {"stopped": 1e12},
         {"speeds": (1, 1)},
         {"speeds": (-1,)},
+        {"widening": -0.1},
+        {"widening": float("nan")},
     ],
 )
 def test_a_band_of_nonsense_is_refused(change: dict[str, Any]) -> None:

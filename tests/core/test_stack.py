@@ -12,6 +12,7 @@ from thermocomp.core.band import Band
 from thermocomp.core.curves import Curve
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input, Support
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
@@ -90,7 +91,8 @@ def random_model(rng: np.random.Generator, number: int) -> ErrorModel:
             top_speed=5.0,
             states=tuple(SpeedState(i, 1.5, float(max(pair)), float(min(pair)), float(rng.normal())) for i in range(n)),
             spread=tuple(map(tuple, rng.normal(size=(2, parts)).tolist())),
-            band=Band(0.9, "assumption", 3, 0.5, 2.0, 1.0, (0,) if n else ()) if rng.integers(2) else None,
+            band=Band(0.9, "assumption", 3, 0.5, 2.0, 1.0, (0,) if n else (), 0.5) if rng.integers(2) else None,
+            joint=JointSupport((0,), (5.0,), ((0.0,), (1.0,)), 0.5) if n and rng.integers(2) else None,
         )
     return Additive(
         target=f"a{number}",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from thermocomp.core.band import Band
 from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input, Support
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.lineardynamic import LinearDynamic
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
@@ -217,8 +218,10 @@ def draw_alone(seed: int) -> Drawn:
         running=2.0,
         stopped=1.5,
         speeds=speeds if rng.random() < 0.5 else (),
+        widening=0.3,
     )
-    model = replace(first, unit="um", target="z_um", band=band if rng.random() < 0.8 else None)
+    near = JointSupport((0,), (2.0,), ((0.0,),), 1.0) if first.inputs and rng.random() < 0.5 else None
+    model = replace(first, unit="um", target="z_um", band=band if rng.random() < 0.8 else None, joint=near)
     return Drawn(Compensator.of([model], own.limits), drawn.plant)
 
 

@@ -10,6 +10,7 @@ from smallmachine import small_machine
 from thermocomp.cli.terminal import print_items
 from thermocomp.core.band import Band
 from thermocomp.core.inputs import Input
+from thermocomp.core.joint import JointSupport
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.judging import assessing, splits, study
 from thermocomp.judging.compare import compare, split_by_cycle
@@ -34,7 +35,8 @@ MODEL = PacedDynamic(
     top_speed=6000.0,
     states=(SpeedState(1, 2.0, 3600.0, 1200.0, 30.0),),
     spread=((0.1, 0.2, 3.0),),
-    band=Band(0.9, "assumption", 4, 1.0, 2.0, 3.0, (1,)),
+    joint=JointSupport((0,), (2.0,), ((0.0,),), 1.0),
+    band=Band(0.9, "assumption", 4, 1.0, 2.0, 3.0, (1,), 0.5),
 )
 TIME = np.arange(0.0, 3600.0, 60.0)
 ROWS = np.column_stack([20.0 + TIME / 600.0, np.where(TIME < 1800, 3000.0, 0.0)])

@@ -6,7 +6,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from thermocomp.core.band import CONFORMAL
+from thermocomp.models.averaged import AveragedDynamic
 from thermocomp.models.bands import find_band
+from thermocomp.models.numerics.folds import find_neighbours
 
 ROWS = 40
 
@@ -76,3 +78,43 @@ def test_errors_of_zero_have_a_band_of_zero() -> None:
     band = find_band(np.zeros(50), np.zeros(50), cycle, np.ones(50, dtype=bool))
     assert band is not None
     assert 0.0 < band.half_width(np.zeros(1), np.zeros(())) < 1e-9
+
+
+def near(cycles: int, recordings: int = 1) -> list[list[int]]:
+    """Return the folds left out with each fold, for recordings of equally many cycles of three rows."""
+    folds = np.repeat(np.arange(cycles * recordings), 3)
+    step = np.where(np.arange(len(folds)) % (3 * cycles) == 0, np.inf, 60.0)
+    return [np.flatnonzero(row).tolist() for row in find_neighbours(folds, step)]
+
+
+@pytest.mark.parametrize("cycles", [1, 3, 4])
+def test_few_cycles_are_left_out_one_by_one(cycles: int) -> None:
+    assert near(cycles) == [[k] for k in range(cycles)]
+
+
+def test_neighbours_are_left_out_too() -> None:
+    assert near(5) == [[0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4]]
+    assert near(9)[:3] == [[0, 1, 2], [0, 1, 2, 3], [0, 1, 2, 3, 4]]
+    assert max(map(len, near(40))) == 5
+
+
+def test_cycles_of_other_recordings_are_no_neighbours() -> None:
+    assert near(1, 9) == [[k] for k in range(9)]
+    assert near(3, 2) == [[0, 1], [0, 1, 2], [1, 2], [3, 4], [3, 4, 5], [4, 5]]
+
+
+def test_a_cycle_is_not_predicted_by_its_neighbours() -> None:
+    """The deviation of a cycle may be known from its neighbours only: then its error is that of an unknown one."""
+    rng = np.random.default_rng(0)
+    cycle, dt = np.repeat(np.arange(6), ROWS), np.r_[np.inf, np.full(6 * ROWS - 1, 60.0)]
+    temperatures = rng.normal(size=(6, 1, 3)).repeat(2, axis=0)[:6].repeat(ROWS, axis=1).reshape(-1, 3)
+    rises = temperatures + 0.01 * rng.normal(size=temperatures.shape)
+    rises[0] = 0.0
+    y = rises @ np.array([5.0, -3.0, 4.0])
+
+    def apart(step: NDArray[np.float64]) -> float:
+        fit = AveragedDynamic(time="routed", noise=0.0, structures=20).fit(rises, y, dt=step, cycle=cycle)
+        return float(np.sqrt(np.mean((fit.left_out_[:, 0] - y) ** 2)))
+
+    alone = np.where(np.arange(len(y)) % ROWS == 0, np.inf, 60.0)  # each cycle a recording
+    assert apart(dt) > 1.2 * apart(alone)

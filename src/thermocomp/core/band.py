@@ -16,6 +16,8 @@ FloatArray = NDArray[np.float64]
 CONFORMAL = 9
 #: largest half-width where the averaged regressions agree [unit]
 WIDEST = 1e6
+#: distance from the training beyond which the band does not widen further [-]
+FARTHEST = 5.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class Band:
 
     The half-width is ``factor * sqrt(floor^2 + spread^2)``. The spread is the standard deviation between the
     regressions that the model averages; it is large where the training data do not determine the output. Inputs are
-    clipped, so the spread does not grow beyond their range.
+    clipped, so the spread does not grow beyond their range. Outside the joint support (`core.joint`), the half-width
+    is multiplied by ``1 + widening * (distance - 1)``, with a distance of at most `FARTHEST`.
 
     Parameters
     ----------
@@ -41,6 +44,8 @@ class Band:
         Factor while the spindle turns, and while it is stopped [-].
     speeds : tuple of int
         Indices of the inputs that show whether the spindle turns; empty: the larger factor always applies.
+    widening : float
+        Relative increase of the half-width per unit of distance outside the joint support [-].
 
     Raises
     ------
@@ -55,10 +60,12 @@ class Band:
     running: float
     stopped: float
     speeds: tuple[int, ...] = ()
+    widening: float = 0.0  # as in files of versions before there was any
 
     def __post_init__(self) -> None:
         check_between("band", 0.5, 1.0 - LEAST, level=self.level)
         check_between("band", LEAST**2, COEFFICIENT, floor=self.floor, running=self.running, stopped=self.stopped)
+        check_between("band", 0.0, COEFFICIENT, widening=self.widening)
         check_between("band", 0.0, WIDEST, **{"half-width": self.floor * max(self.running, self.stopped)})
         check_between("band", CONFORMAL if self.basis == "conformal" else 2, COEFFICIENT, cycles=self.cycles)
         if min(self.speeds, default=0) < 0:
@@ -79,7 +86,7 @@ class Band:
             rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
         return (
             f"{self.words}: half-width at least {rest} at rest and {run} with the spindle running, more where the "
-            "averaged models disagree"
+            "averaged models disagree" + (" and far from the training data" if self.widening else "")
         )
 
     def turning(self, change: FloatArray, stopped: float = THRESHOLDS.stopped_speed) -> NDArray[np.bool_]:
@@ -87,7 +94,11 @@ class Band:
         return np.asarray(np.logical_or.reduce([np.abs(change[..., k]) > stopped for k in self.speeds]))
 
     def half_width(
-        self, change: FloatArray, spread: FloatArray, stopped: float = THRESHOLDS.stopped_speed
+        self,
+        change: FloatArray,
+        spread: FloatArray,
+        stopped: float = THRESHOLDS.stopped_speed,
+        distance: FloatArray | float = 0.0,
     ) -> FloatArray:
         """Return the half-width for states of the inputs.
 
@@ -99,6 +110,8 @@ class Band:
             Spread of the averaged regressions [unit].
         stopped : float
             Largest speed that counts as stopped [1/min].
+        distance : array-like of shape (...,)
+            See `thermocomp.core.joint.JointSupport.distance`.
 
         Returns
         -------
@@ -108,4 +121,9 @@ class Band:
         factor: FloatArray | float = max(self.running, self.stopped)
         if self.speeds:
             factor = np.where(self.turning(change, stopped), self.running, self.stopped)
-        return np.asarray(factor * np.sqrt(self.floor**2 + spread**2))
+        return np.asarray(factor * np.sqrt(self.floor**2 + spread**2) * widen(self.widening, distance))
+
+
+def widen(widening: FloatArray | float, distance: FloatArray | float) -> FloatArray:
+    """Return the relative half-width at a distance from the training data, 1 inside the joint support."""
+    return np.asarray(1.0 + widening * (np.minimum(np.maximum(distance, 1.0), FARTHEST) - 1.0))

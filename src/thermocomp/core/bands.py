@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray, IntArray
+from thermocomp.core.band import widen
 
 if TYPE_CHECKING:
     from thermocomp.core.model import ErrorModel
@@ -33,6 +34,17 @@ class Bands:
             )
             for name in ("running", "stopped")
         )
+        self._widening = np.array([0.0 if b is None else b.widening for b in bands])
+        # models mostly have the same joint support: each distance is computed once
+        apart = [
+            (m.joint, tuple(own.tolist())) if w else None
+            for m, own, w in zip(models, taps, self._widening, strict=True)
+        ]
+        self._apart = [
+            (joint, np.array(own, dtype=np.intp), np.array([a == (joint, own) for a in apart]))
+            for joint, own in dict.fromkeys(a for a in apart if a is not None)
+            if joint is not None
+        ]
         # models mostly have the same speeds: each position and threshold is compared once
         speeds = [
             {(place, m.thresholds.stopped_speed) for place in own[list(m.band.speeds)].tolist()} if m.band else set()
@@ -44,16 +56,21 @@ class Bands:
         of = [one in own for one in each for own in speeds]
         self._of = np.array(of, dtype=np.bool_).reshape(len(each), len(models))
 
-    def half_widths(self, change: FloatArray, spreads: FloatArray) -> FloatArray:
+    def half_widths(self, change: FloatArray, clipped: FloatArray, spreads: FloatArray) -> FloatArray:
         """Return the half-widths, (..., n_models); nan for a model without a band.
 
         Parameters
         ----------
         change : ndarray of shape (..., n_positions)
             Inputs minus their reference [their units].
+        clipped : ndarray of shape (..., n_positions)
+            The same, clipped to the trained ranges.
         spreads : ndarray of shape (..., n_spreads)
             Spreads of all models, in their order [their units].
         """
-        turns = (np.abs(change.take(self._speeds, axis=-1)) > self._most) @ self._of
+        turns = (np.abs(clipped.take(self._speeds, axis=-1)) > self._most) @ self._of
         factor = np.where(turns, self._running, self._stopped)
-        return np.asarray(factor * np.sqrt(self._floor + spreads**2 @ self._sums))
+        found = np.asarray(factor * np.sqrt(self._floor + spreads**2 @ self._sums))
+        for joint, own, mine in self._apart:
+            found[..., mine] *= widen(self._widening[mine], joint.distance(change[..., own])[..., None])
+        return found

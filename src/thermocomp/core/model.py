@@ -218,16 +218,17 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         if memory is None:
             memory, steps[0] = layers.begin(clipped[0]), 0.0
         memory, outputs = layers.run(memory, clipped, steps)
-        deviation = outputs[..., 0]
+        deviation, far = outputs[..., 0], np.zeros(outputs.shape[:-1])
+        if self.joint is not None and (self.support.policy != "clip" or (self.band and self.band.widening)):
+            far = self.joint.distance(change)
         if self.support.policy != "clip":
-            far = np.zeros(deviation.shape) if self.joint is None else self.joint.distance(change)
             before, found = state.deviation, np.empty(deviation.shape)
             for k in range(len(inputs)):
                 found[k] = self._range.keep(self.support, before, deviation[k], change[k], clipped[k], far[k])
                 before = found[k]
             deviation = found
         last = State(reference, memory, deviation[-1], outside[-1])
-        return RunOutputs(state=last, deviation=deviation, outside=outside, change=clipped, outputs=outputs)
+        return RunOutputs(state=last, deviation=deviation, outside=outside, change=clipped, far=far, outputs=outputs)
 
     def _refuse_reading(self, inputs: FloatArray, dt: float) -> ReadingError:
         return ReadingError(
@@ -282,17 +283,18 @@ class ErrorModel(Gated, Replayable, ModelFamily):
             return np.full(np.shape(inputs)[:-1], np.nan)
         change = self.change(state, inputs)
         found = self._layers.advance(state.memory, change, 0.0)[1]
-        return self.widen(change, found, state.deviation)
+        far = self.distance(state, inputs) if self.band.widening else np.zeros(change.shape[:-1])
+        return self.widen(RunOutputs(state, state.deviation, state.outside, change, far, found))
 
-    def widen(self, change: FloatArray, outputs: FloatArray, deviation: FloatArray) -> FloatArray:
-        """Return the half-widths, (...,), from the clipped changes, the outputs and the deviation of a `RunOutputs`."""
+    def widen(self, run: RunOutputs) -> FloatArray:
+        """Return the half-widths of the band, (...,), for the outputs of `run`."""
         if self.band is None:
-            return np.full(deviation.shape, np.nan)
+            return np.full(run.deviation.shape, np.nan)
         kept: FloatArray | float = 0.0
         if self.support.policy != "clip":
-            kept = np.abs(outputs[..., 0] - deviation)
-        spread = np.sqrt((outputs[..., 1:] ** 2).sum(axis=-1))
-        return self.band.half_width(change, spread, self.thresholds.stopped_speed) + kept
+            kept = np.abs(run.outputs[..., 0] - run.deviation)
+        spread = np.sqrt((run.outputs[..., 1:] ** 2).sum(axis=-1))
+        return self.band.half_width(run.change, spread, self.thresholds.stopped_speed, run.far) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
         """Return the directions in which the regressions averaged by the model differ.

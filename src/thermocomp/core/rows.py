@@ -46,7 +46,7 @@ class Runnable(Protocol):
     def run(self, state: State, inputs: FloatArray, steps: FloatArray, further: Sequence[Node] = ()) -> RunOutputs:
         """Process readings one after another."""
 
-    def widen(self, change: FloatArray, outputs: FloatArray, deviation: FloatArray) -> FloatArray:
+    def widen(self, run: RunOutputs) -> FloatArray:
         """Return the half-widths of the band for the outputs of `run`."""
 
 
@@ -156,4 +156,4 @@ class Replayable:
             [unit]; NaN without a band, and before the first complete row of a test.
         """
         found = run_table(self, table, time, reference=reference)
-        return found.spread(lambda run: self.widen(run.change, run.outputs, run.deviation), np.nan)
+        return found.spread(self.widen, np.nan)

@@ -170,7 +170,7 @@ class Stack:
         if state.memory is None or all(m.band is None for m in self.models):
             return np.full((*values.shape[:-1], len(self.models)), np.nan)
         said, n = state.outputs, len(self.models)
-        found = self._bands.half_widths(self._changes(state.reference, values)[1], said[..., n:])
+        found = self._bands.half_widths(*self._changes(state.reference, values), said[..., n:])
         if self._moved:
             found[..., self._moved] += np.abs(said[..., self._moved] - state.deviation[..., self._moved])
         return found

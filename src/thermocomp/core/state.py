@@ -24,4 +24,5 @@ class RunOutputs(NamedTuple):
     deviation: FloatArray  #: (n_readings, ...) [unit]
     outside: BoolArray  #: (n_readings, ..., n_inputs), inputs beyond the trained range
     change: FloatArray  #: (n_readings, ..., n_inputs), minus the reference, clipped to the trained range
+    far: FloatArray  #: (n_readings, ...), distance from the training data; 0 if nothing depends on it
     outputs: FloatArray  #: (n_readings, ..., n_outputs), deviation at `change`, spread, further expressions

@@ -11,7 +11,7 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.paceddynamic import LaggedInput, PacedDynamic, SpeedState
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.models.base import FloatArray, IntArray
-from thermocomp.models.numerics.folds import halve
+from thermocomp.models.numerics.folds import find_neighbours, halve
 from thermocomp.models.numerics.structures import Moments, fit_each, share_out
 from thermocomp.models.pacedfeatures import PacedFeatures
 from thermocomp.models.timed import Time, TimedRegressor
@@ -81,8 +81,9 @@ class AveragedDynamic(TimedRegressor):
     chosen_by_ : str
         Description of the cross-validation folds.
     left_out_ : ndarray of shape (n_rows, 2)
-        Prediction for each training row by regressions fitted without its cycle, and their standard deviation [unit of
-        y]; nan elsewhere.
+        Prediction for each training row by regressions fitted without its cycle and, with five cycles or more, without
+        the neighbouring ones (`numerics.folds.find_neighbours`), and their standard deviation [unit of y]; nan
+        elsewhere.
     gain_ : ndarray of shape (n_inputs,)
         Magnitude of the response of y to a step of each temperature, after one row [unit of y per degC]; 0 for a speed.
 
@@ -131,7 +132,8 @@ class AveragedDynamic(TimedRegressor):
         each = fit_each(moments, structures, everything)[..., 0]
         self.coef_, self.cv_rms_ = shares[:, 0] @ each, float(errors.mean())
         self._spread = _main_directions(np.sqrt(shares) * (each - self.coef_), moments)
-        without = [np.setdiff1d(everything, parts[folds == k]) for k in range(int(folds.max()) + 1)]
+        gone = [np.flatnonzero(near) for near in find_neighbours(folds, step)]
+        without = [np.setdiff1d(everything, parts[np.isin(folds, own)]) for own in gone]
         others = np.array([fit_each(moments, structures, kept)[..., 0] for kept in without])
         self.left_out_ = self._leave_out(rows, step, folds, others, shares[:, 0])
         self.lags_, self.top_speed_ = self._features.lags, self._features.top_speed

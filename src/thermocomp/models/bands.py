@@ -8,9 +8,12 @@ from scipy import stats
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.band import CONFORMAL, Band
+from thermocomp.models.numerics.folds import APART
 
 #: share of the rows of unseen cycles that a band should cover
 LEVEL = 0.9
+#: relative increase of the half-width per unit of distance outside the joint support
+WIDENING = 0.33
 #: minimum spread used, relative to its root mean square on the left-out cycles
 FLOOR = 0.5
 _LEAST = 1e-6  # lower limit of divisors [unit], and of a size relative to that
@@ -28,9 +31,10 @@ def find_band(
 
     The error is expressed in units of ``sqrt(floor^2 + spread^2)``; its size in these units differs between a running
     and a stopped spindle. Errors within a cycle are dependent, so n cycles count as n independent values. The size for
-    one further cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom times
-    sqrt(1 + 1/n). From `CONFORMAL` cycles onwards, the only assumption is that the cycles are exchangeable: the
-    quantile of the errors, with equal weight for each cycle and for one additional unknown cycle.
+    one further cycle is that of the prediction interval of a sample: Student's t with n - 1 degrees of freedom, with
+    fewer than `APART` cycles times sqrt(1 + 1/n), since their neighbours were not left out. From `CONFORMAL` cycles
+    onwards, the only assumption is that the cycles are exchangeable: the quantile of the errors, with equal weight for
+    each cycle and for one additional unknown cycle.
 
     Parameters
     ----------
@@ -67,9 +71,18 @@ def find_band(
         place = int(np.searchsorted(np.cumsum(weights[order]), level - 1e-9))
         factor = float(scores[order][min(place, len(order) - 1)])
     else:
-        factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * np.sqrt(1 + 1 / n))
+        factor = float(stats.t.ppf(0.5 + level / 2, n - 1) * (np.sqrt(1 + 1 / n) if n < APART else 1.0))
     running, stopped = (max(factor * size, _LEAST) for size in (running, stopped))
-    return Band(level=level, basis=basis, cycles=n, floor=floor, running=running, stopped=stopped, speeds=tuple(speeds))
+    return Band(
+        level=level,
+        basis=basis,
+        cycles=n,
+        floor=floor,
+        running=running,
+        stopped=stopped,
+        speeds=tuple(speeds),
+        widening=WIDENING,
+    )
 
 
 def _size(errors: FloatArray, rows: Sequence[BoolArray], phase: BoolArray) -> float:

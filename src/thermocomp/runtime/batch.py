@@ -219,7 +219,7 @@ def _said(model: ErrorModel, time: FloatArray, values: FloatArray, used: BoolArr
     return _Answers(
         deviation=spread(ran.deviation, 0.0),
         outside=spread(ran.outside.max(axis=1, initial=0.0), 0.0) > 0,
-        half_width=spread(model.widen(ran.change, ran.outputs, ran.deviation), np.nan),
+        half_width=spread(model.widen(ran), np.nan),
         directions=spread(ran.outputs[:, 1:], 0.0),
     )
 

@@ -104,10 +104,11 @@ class _Joint:
         """Process a reading with all models of the group: see `Group.step`."""
         begins, lead = state.memory is None, self._lead
         reference = lead.settle(state.reference, values) if begins else state.reference
-        change, outside = lead.clip(values - reference)
-        memory = self._layers.begin(change) if state.memory is None else state.memory
-        memory, said = self._layers.advance(memory, change, 0.0 if begins else dt)
-        deviations, widths = said[: self._n], self._bands.half_widths(change, said[self._n :])
+        change = values - reference
+        clipped, outside = lead.clip(change)
+        memory = self._layers.begin(clipped) if state.memory is None else state.memory
+        memory, said = self._layers.advance(memory, clipped, 0.0 if begins else dt)
+        deviations, widths = said[: self._n], self._bands.half_widths(change, clipped, said[self._n :])
         found = [State(reference, memory, d, outside) for d in deviations]
         return found, deviations.tolist(), widths.tolist()
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from thermocomp.core.arrays import BoolArray, IntArray
+from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import FitError, InputError
 
 
@@ -39,6 +39,38 @@ def number_folds(cycle: ArrayLike | None, n_rows: int) -> tuple[IntArray, str]:
         folds[learned] = np.arange(learned.size) * min(5, learned.size) // learned.size
         return folds, "five stretches of one thermal cycle, left out in turn"
     return folds, f"{number + 1} thermal cycles, left out in turn"
+
+
+#: fewest cycles of which neighbours can be left out together
+APART = 5
+#: most neighbours on each side that are left out together with a thermal cycle
+_MOST_NEIGHBOURS = 2
+
+
+def find_neighbours(folds: IntArray, step: FloatArray) -> BoolArray:
+    """Return which folds are left out together to estimate the error in later use.
+
+    Successive cycles of a recording share the state of a warm-up, the weather and the zero; one that is predicted by
+    its neighbours is known better than a later one will be. With `APART` folds or more, the neighbours in the same
+    recording are left out too: up to a quarter of the other folds on each side.
+
+    Parameters
+    ----------
+    folds : ndarray of int of shape (n_rows,)
+        As returned by `number_folds`.
+    step : ndarray of shape (n_rows,)
+        Time since the previous row [s], inf at the start of a recording.
+
+    Returns
+    -------
+    ndarray of bool of shape (n_folds, n_folds)
+        Row k: folds left out to predict fold k.
+    """
+    order = np.arange(int(folds.max()) + 1)
+    reach = min(_MOST_NEIGHBOURS, (len(order) - 1) // (APART - 1))
+    recording = np.cumsum(np.isinf(step))[[int(np.argmax(folds == k)) for k in order]]
+    apart = np.abs(order[:, None] - order)
+    return np.asarray((apart == 0) | ((apart <= reach) & (recording[:, None] == recording)))
 
 
 #: smallest share of a thermal cycle that is left out separately
