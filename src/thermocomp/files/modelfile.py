@@ -117,6 +117,15 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
     prints = entry["provenance"] and entry["provenance"]["prints"]
     if prints and not prints["excerpts"]:
         del prints["excerpts"]  # as in a file from before there were any
+    return drop_unused(entry)
+
+
+def drop_unused(entry: dict[str, Any]) -> dict[str, Any]:
+    """Remove fields of a model that have no effect and that files of earlier versions lack: its hash is the same."""
+    if entry["band"] and not entry["band"]["widening"]:
+        del entry["band"]["widening"]
+    if entry["validity"] and entry["validity"]["axes"] == "not recorded":
+        del entry["validity"]["axes"]
     return entry
 
 

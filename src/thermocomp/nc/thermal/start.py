@@ -14,6 +14,7 @@ from thermocomp.core.exceptions import InputError, explain_unknown
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
 from thermocomp.core.units import read_with_unit as with_unit
+from thermocomp.files.modelfile import drop_unused
 from thermocomp.nc.thermal.inputs import SPEED, Inputs, Wiring
 from thermocomp.nc.thermal.jobstate import JobState, StationState
 from thermocomp.nc.thermal.stations import Station
@@ -163,7 +164,7 @@ def hand_over_state(station: Station, state: State, zero: float, doubt: float) -
 def identity(model: ErrorModel) -> str:
     """Return a hash of the parameters of a model, independent of its origin and assessment."""
     others = ("family", "provenance", "honest_error", "thresholds")
-    numbers = {k: v for k, v in asdict(model).items() if k not in others}
+    numbers = {k: v for k, v in drop_unused(asdict(model)).items() if k not in others}
     if numbers["watch"]:
         del numbers["watch"]["thresholds"]
     return hashlib.sha256(json.dumps([model.family, numbers], sort_keys=True).encode()).hexdigest()
