@@ -32,6 +32,8 @@ OVERLAP = 0.4
 #: largest difference from a copy, relative to the movement of a temperature, in three quarters of them; and the number
 #: of parts of the curve whose means are compared
 APART, POINTS = 0.04, 40
+#: largest factor between the movements; noiseless tests at two speeds may differ by nothing else
+GAIN = 1.25
 #: scales of the fluctuations [block]
 SCALES = (1, 2, 4)
 #: a copy: in three quarters of the temperatures, signs agree more often than by chance by this number of standard
@@ -206,14 +208,15 @@ def _pairs(curve: _Curve, table: _Table, to: _Map, names: Sequence[str]) -> list
 
 
 def _same_course(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
-    """Return whether temperatures follow each other all the way, apart from a factor and an offset."""
-    apart = []
+    """Return whether temperatures follow each other all the way, apart from an offset and a factor near 1."""
+    apart, gains = [], []
     for x, y in pairs:
         size = max(len(x) // POINTS, 1)
         n = len(x) // size * size
         a, b = (v[:n].reshape(-1, size).mean(axis=1) for v in (x, y))
         apart.append(float(np.sqrt(max(1.0 - _correlation(a, b) ** 2, 0.0))))
-    return float(np.quantile(apart, 0.75)) <= APART
+        gains.append(float(np.std(a) / max(float(np.std(b)), 1e-12)))
+    return float(np.quantile(apart, 0.75)) <= APART and 1.0 / GAIN <= float(np.median(gains)) <= GAIN
 
 
 def _surely(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
