@@ -140,7 +140,7 @@ def test_copies_of_which_a_part_is_recognised_are_left_out_whole(shared_data: Pa
 
 
 def test_rows_are_those_of_the_original() -> None:
-    copy = stretched(noisy(day()))
+    copy = stretched(smoothed(day(), 5))
     found = found_rows(*(samples_of(r, "z_um") for r in (day(), copy)))
     there = 1.03 * copy.time / 20.0
     assert np.abs(found - there)[found >= 0].max() <= 12
@@ -150,8 +150,8 @@ def test_of_a_second_half_and_another_day_only_the_half_is_found() -> None:
     half = len(day()) // 2
     new = columns(day(5, "random"))
     new = {n: np.repeat(new[n], 3)[:1500] for n in columns(day()) if n in new}
-    joined = {n: np.concatenate([x[half:] + (new[n][0] - x[-1]), new[n]]) for n, x in columns(noisy(day())).items()
-              if n in new}  # fmt: skip
+    old = {n: x for n, x in columns(smoothed(day(), 9)).items() if n in new}
+    joined = {n: np.concatenate([x[half:] + (new[n][0] - x[-1]), new[n]]) for n, x in old.items()}
     both = with_rows(day(), 20.0 * np.arange(len(joined["z_um"])), joined)
     found = found_rows(*(samples_of(r, "z_um") for r in (day(), both)))
     rest = len(day()) - half
@@ -209,7 +209,8 @@ def hot(seed: int, gain: float = 1.0, noise: float = 0.02) -> Recording:
     like, rng = small_machine(), np.random.default_rng(seed)
     plain = columns(small_machine(noise=0.0))
     speed = plain["spindle_rpm"]
-    load = np.convolve(speed * (1 + 0.5 * np.sign(np.sin(np.arange(len(speed)) / 7.0) - 0.3)), np.ones(9) / 9, "same")
+    often = 1 + 0.5 * np.sign(np.sin(np.arange(len(speed)) / 7.0) - 0.3)
+    load = np.convolve(speed * often, np.exp(-np.arange(40) / 8.0) / 8.0)[: len(speed)]
     x, y = plain["t1_C"] - plain["t3_C"], plain["t2_C"] - plain["t3_C"]
     heat = {"t1_C": x + load / 500, "t2_C": y + load / 900, "t3_C": x + y + load / 700, "z_um": 5.0 * x + load / 200}
     return with_rows(like, like.time, {n: 20 + gain * h + noise * rng.normal(size=len(h)) for n, h in heat.items()})

@@ -128,7 +128,9 @@ def _means(time: FloatArray, x: FloatArray, at: FloatArray, width: float) -> Flo
 def _noise(time: FloatArray, x: FloatArray, width: float) -> float:
     """Return the standard deviation of the noise of a mean over a width [s]."""
     rows = max(width / float(np.median(np.diff(time))), 1.0)
-    return max(typical_change(x, 3) / 3.6 / float(np.sqrt(rows)), 1e-9 * float(np.abs(x).max()), 1e-12)
+    # the median does not contain the steps of a duty; it is 0 if most rows repeat their predecessors
+    noise = float(np.median(np.abs(np.diff(x, 3)))) / 3.0 or typical_change(x, 3) / 3.6
+    return max(noise / float(np.sqrt(rows)), 1e-9 * float(np.abs(x).max()), 1e-12)
 
 
 def _chosen(means: Mapping[str, FloatArray]) -> list[str]:
