@@ -152,7 +152,7 @@ def test_of_a_second_half_and_another_day_only_the_half_is_found() -> None:
     new = {n: np.repeat(new[n], 3)[:1500] for n in columns(day()) if n in new}
     old = {n: x for n, x in columns(smoothed(day(), 9)).items() if n in new}
     joined = {n: np.concatenate([x[half:] + (new[n][0] - x[-1]), new[n]]) for n, x in old.items()}
-    both = with_rows(day(), 20.0 * np.arange(len(joined["z_um"])), joined)
+    both = with_rows(day(), np.asarray(20.0 * np.arange(len(joined["z_um"]))), joined)
     found = found_rows(*(samples_of(r, "z_um") for r in (day(), both)))
     rest = len(day()) - half
     assert np.mean(found[:rest] >= 0) > 0.99
