@@ -82,7 +82,7 @@ def noisy(r: Recording, temperature: float = 0.1, displacement: float = 0.3) -> 
     return with_rows(r, r.time, table)
 
 
-def thinned(r: Recording, rows: int = 5) -> Recording:
+def thinned(r: Recording, rows: int = 3) -> Recording:
     step = rows * float(np.median(np.diff(r.time)))
     time = np.arange(r.time[0] + 7.0, r.time[-1], step)
     return with_rows(r, time, {n: np.interp(time, r.time, x) for n, x in columns(r).items()})
@@ -129,13 +129,11 @@ def test_every_tenth_or_twentieth_row_of_a_real_test(rows: int, shared_data: Pat
     assert share(real, thinned(real, rows), "ch3_um") > 0.99
 
 
-def test_copies_of_which_a_part_is_recognised_are_left_out_whole(shared_data: Path) -> None:
-    real = read(shared_data / "fl_thermal" / "recording.csv")
-    one, copy = (samples_of(r, "ch3_um") for r in (real, noisy(real, 0.05, 0.15)))
+def test_copies_of_which_a_part_is_recognised_are_left_out_whole() -> None:
+    one, copy = (samples_of(r, "y1_um") for r in (day(), noisy(day(), 0.04, 0.3)))
     prints = fingerprint(one, 0, np.ones(len(one), np.bool_))
     assert prints is not None
-    by_excerpts = overlap(replace(prints, curves=()), copy, 0)
-    assert np.mean(by_excerpts >= 0) > 0.3
+    assert 0.1 < np.mean(overlap(replace(prints, curves=()), copy, 0) >= 0) < 0.9
     assert np.mean(overlap(prints, copy, 0) >= 0) > 0.99
 
 
@@ -162,7 +160,7 @@ def test_of_a_second_half_and_another_day_only_the_half_is_found() -> None:
 def test_of_two_files_both_are_named_with_their_rows() -> None:
     days = [day(), day(1), replace(smoothed(day()), name="again")]
     samples = stack(days, ["y1_um"], starts=[COLD] * 3)
-    with pytest.raises(InputError, match=r"again: rows \d+-\d+ repeat rows \d+-\d+ of demo"):
+    with pytest.raises(InputError, match=r"again#3: rows \d+-\d+ repeat rows \d+-\d+ of demo#1"):
         refuse_leaks(samples, splits.leave_one_file_out(samples))
 
 
@@ -190,7 +188,7 @@ def test_other_days_of_a_duty_are_no_copies(protocol: str, target: str) -> None:
 
 def test_nor_are_they_with_few_sensors_that_the_duty_heats() -> None:
     hot = ["t_front_seat_C", "t_rear_seat_C", "t_motor_C", "t_y_bearing_C"]
-    for one, other in permutations([day(seed, "random") for seed in range(5)], 2):
+    for one, other in permutations([day(seed, "random") for seed in range(4)], 2):
         assert share(one, other, "z_um", [*hot, "spindle_rpm"]) == 0.0
 
 

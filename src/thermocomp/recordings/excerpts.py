@@ -152,21 +152,13 @@ def find_excerpts(
         there = lead.excerpt.row + (samples.time[rows] - lead.begin) / lead.excerpt.interval
         known = {p.excerpt.row for p in mine}
         for a, b in ((a, b) for a, b in learned if a <= lead.excerpt.row < b):
-            # as far as the next excerpt that is not there: its noise is not, nor is its drift
-            others = [e for e in excerpts if a <= e.row < b and e.row not in known]
-            missing = [e.row for e in others if not _follows(e, lead, table)]
+            # as far as the next excerpt that is not there
+            missing = [e.row for e in excerpts if a <= e.row < b and e.row not in known]
             for row in known:
                 first = max([a, *(m for m in missing if m < row)])
                 end = min([b, *(m for m in missing if m > row)])
                 source = np.where((source < 0) & (there >= first) & (there < end), there.astype(np.intp), source)
     return source
-
-
-def _follows(excerpt: Excerpt, known: _Place, table: _Table) -> bool:
-    """Return whether the target of another test drifts like an excerpt where another excerpt suggests its place."""
-    name, text = next(iter(excerpt.values.items()))
-    x, begin = unpack_values(text), _shift(known) + excerpt.row * excerpt.interval
-    return name in table.columns and _misfit(x, excerpt.interval, begin, table, name) < UNLIKE * float(np.std(x))
 
 
 def _shift(place: _Place) -> float:
