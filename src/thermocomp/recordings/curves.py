@@ -41,7 +41,7 @@ SCALES = (1, 2, 4)
 CERTAIN, LEAST_SHARE = 4.0, 0.15
 #: two tests with the same noise, by this factor, are from the same instruments; unless they are copies they differ by
 #: the noise of both, a copy by less than this share of it (variance)
-SAME_NOISE, INDEPENDENT = 1.5, 0.5
+SAME_NOISE, INDEPENDENT = 1.5, 0.4
 
 
 class _Map(NamedTuple):
@@ -186,20 +186,18 @@ def _copied(curve: _Curve, table: _Table) -> _Map | None:
     """Return the relation of times if a test is a copy."""
     first, *_ = table.columns
     inputs = [n for n in curve.means if n != first]
-    if len(inputs) < LEAST_INPUTS:
+    if first not in curve.means or len(inputs) < LEAST_INPUTS:
         return None
-    restless = max(inputs, key=lambda n: float(np.ptp(curve.means[n])))
-    for lead in dict.fromkeys([*(n for n in curve.means if n == first), restless]):
-        to = _locate(curve, table, lead)
-        if to.score < ALIKE:
-            continue
-        near = [to._replace(begin=to.begin + k * curve.width * to.clock / 4) for k in range(-4, 5)]
-        pairs = [_pairs(curve, table, t, inputs) for t in near]
-        sure = [_surely(p) for p in pairs]
-        k = int(np.argmax(sure))
-        if sure[k] >= CERTAIN and _same_course(pairs[k]) and _same_noise(curve, table, near[k], inputs, pairs[k]):
-            return near[k]
-    return None
+    to = _locate(curve, table, first)
+    if to.score < ALIKE:
+        return None
+    near = [to._replace(begin=to.begin + k * curve.width * to.clock / 4) for k in range(-4, 5)]
+    pairs = [_pairs(curve, table, t, inputs) for t in near]
+    sure = [_surely(p) for p in pairs]
+    k = int(np.argmax(sure))
+    if sure[k] < CERTAIN or not _same_course(pairs[k]) or not _same_noise(curve, table, near[k], inputs, pairs[k]):
+        return None
+    return near[k]
 
 
 def _pairs(curve: _Curve, table: _Table, to: _Map, names: Sequence[str]) -> list[tuple[FloatArray, FloatArray]]:
@@ -246,9 +244,9 @@ def _same_noise(
         gain = _correlation(x, y) * float(np.std(x) / max(float(np.std(y)), 1e-12))
         mine, other = curve.noise[name], abs(gain) * _noise(table.time, table.columns[name], curve.width * to.clock)
         if mine / SAME_NOISE < other < mine * SAME_NOISE:
-            differs = typical_change(x - gain * y, 3) / 3.6
+            differs = float(np.median(np.abs(np.diff(x - gain * y, 3)))) / 3.0
             ratios.append(differs**2 / (mine**2 + other**2))
-    return not ratios or float(np.median(ratios)) < INDEPENDENT
+    return max(ratios, default=0.0) < INDEPENDENT
 
 
 def _correlation(x: FloatArray, y: FloatArray) -> float:
