@@ -160,14 +160,15 @@ def test_of_two_files_both_are_named_with_their_rows() -> None:
 
 
 def test_models_recognise_them_after_reading_their_file(tmp_path: Path) -> None:
-    samples = stack([day(0, "random")], ["z_um"], starts=COLD)
+    inputs = ["t_front_seat_C", "t_air_C", "t_bed_front_C", "t_column_rear_left_C"]
+    samples = stack([day(0, "random")], ["z_um"], inputs, starts=COLD)
     model = study.fit(samples, "ols", splits.leave_one_cycle_out(samples)).models[0]
     modelfile.write([model], tmp_path / "m.json")
     (again,) = modelfile.read(tmp_path / "m.json")
     assert again.provenance == model.provenance
-    copy = stack([smoothed(day(0, "random"), 9)], ["z_um"], starts=COLD)
+    copy = stack([smoothed(day(0, "random"), 9)], ["z_um"], inputs, starts=COLD)
     assert find_learned_rows(again, copy).all()
-    assert not find_learned_rows(again, stack([day(1, "random")], ["z_um"], starts=COLD)).any()
+    assert not find_learned_rows(again, stack([day(1, "random")], ["z_um"], inputs, starts=COLD)).any()
 
 
 # -- repeats of a duty -------------------------------------------------------------------------------------------------
