@@ -133,6 +133,9 @@ class Prints:
         One per stride.
     excerpts : tuple of Excerpt
         Rows in which copies are recognised that were resampled, shifted in time, rounded or made noisy.
+    curves : tuple of Excerpt
+        Block means of training sections, whose interval is the width of a block [s] and whose step is the noise of a
+        mean: for copies that were smoothed, thinned or made very noisy.
     """
 
     interval: float
@@ -140,6 +143,7 @@ class Prints:
     steps: dict[str, float]
     runs: tuple[Runs, ...]
     excerpts: tuple[Excerpt, ...] = ()
+    curves: tuple[Excerpt, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 < self.interval < np.inf:

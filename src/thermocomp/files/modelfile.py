@@ -115,8 +115,9 @@ def entry_of(model: ErrorModel) -> dict[str, Any]:
     entry = asdict(replace(model, watch=None))
     del entry["watch"], entry["thresholds"]  # stored once per file
     prints = entry["provenance"] and entry["provenance"]["prints"]
-    if prints and not prints["excerpts"]:
-        del prints["excerpts"]  # as in a file from before there were any
+    for name in ("excerpts", "curves"):
+        if prints and not prints[name]:
+            del prints[name]  # as in a file from before there were any
     return drop_unused(entry)
 
 

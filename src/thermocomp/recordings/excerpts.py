@@ -92,8 +92,8 @@ def _table(samples: Samples, target: int, rows: IntArray) -> _Table:
 def _noisiest(table: _Table) -> list[str]:
     """Return the channels in which noise is visible, the noisiest first, the target in any case among them."""
     first, *_ = table.columns
-    rough = {n: _typical(x, 3) / max(_typical(x, 2), 1e-12) for n, x in table.columns.items()}
-    noisy = [n for n, x in table.columns.items() if rough[n] > ROUGH and _typical(x, 3) > ROUGH * _resolution(x)]
+    rough = {n: typical_change(x, 3) / max(typical_change(x, 2), 1e-12) for n, x in table.columns.items()}
+    noisy = [n for n, x in table.columns.items() if rough[n] > ROUGH and typical_change(x, 3) > ROUGH * _resolution(x)]
     others = sorted((n for n in noisy if n != first), key=lambda n: -rough[n])
     return [first, *others[: CHANNELS - 1]] if noisy else []
 
@@ -105,7 +105,7 @@ def _resolution(x: FloatArray) -> float:
     return float(steps.min()) if steps.size else np.inf
 
 
-def _typical(x: FloatArray, order: int) -> float:
+def typical_change(x: FloatArray, order: int) -> float:
     """Return the mean absolute difference of an order, without the largest ones: those of a step, for example."""
     size = np.sort(np.abs(np.diff(x, order)))
     return float(size[: max(int(0.95 * len(size)), 1)].mean()) if size.size else 0.0
@@ -115,7 +115,7 @@ def _excerpt(table: _Table, names: Sequence[str], part: slice, row: int) -> tupl
     values, moves = dict[str, str](), 0.0
     for name in names:
         x = table.columns[name][part]
-        noise = max(_typical(x, 3) / 3.6, 1e-9 * float(np.abs(x).max()), 1e-12)  # 3.6: of white noise
+        noise = max(typical_change(x, 3) / 3.6, 1e-9 * float(np.abs(x).max()), 1e-12)  # 3.6: of white noise
         moves = moves or float(np.ptp(x)) / noise
         values[name] = pack_values(x - x[0], noise / FINE)
     return moves, Excerpt(row, float(np.mean(np.diff(table.time[part]))), values)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.fingerprints import Prints, Runs, pack_marks
+from thermocomp.recordings.curves import take_curves
 from thermocomp.recordings.excerpts import take_excerpts
 from thermocomp.recordings.samples import Samples
 
@@ -108,6 +109,7 @@ def fingerprint(samples: Samples, target: int, learn: BoolArray, *, thin: bool =
         steps=steps,
         runs=tuple(runs),
         excerpts=take_excerpts(samples, target, learn) if thin else (),
+        curves=take_curves(samples, target, learn) if thin else (),
     )
 
 

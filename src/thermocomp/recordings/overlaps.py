@@ -1,11 +1,12 @@
 """Recognition of the training rows of a model in any file; see the decision `0019-overlap`."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from thermocomp.core.arrays import IntArray
-from thermocomp.core.fingerprints import Excerpt, Prints, Runs, unpack_marks
+from thermocomp.core.fingerprints import Prints, Runs, unpack_marks
+from thermocomp.recordings.curves import find_curves, take_curves
 from thermocomp.recordings.excerpts import find_excerpts, take_excerpts
 from thermocomp.recordings.fingerprints import LENGTH, Marks, TargetRows, find_rows, fingerprint, hash_runs
 from thermocomp.recordings.samples import Samples
@@ -29,7 +30,7 @@ def overlap(prints: Prints, samples: Samples, target: int) -> IntArray:
     everything = np.ones(len(samples), dtype=np.bool_)
     source = _overlap(prints, samples, target, samples.interval(everything), own=False)
     for k in range(len(samples.test_names)):
-        _add_copies(source, prints.excerpts, prints.learned, samples, target, k)
+        _add_copies(source, prints, samples, target, k)
     return source
 
 
@@ -76,25 +77,29 @@ def altered_copies(samples: Samples) -> IntArray:
     source = np.full(len(samples), -1, dtype=np.intp)
     target = int(np.argmax([np.ptp(x[np.isfinite(x)]) if np.isfinite(x).any() else 0.0 for x in samples.deviations.T]))
     for k in range(len(samples.test_names) - 1):
-        rows = np.flatnonzero(samples.test == k)
-        excerpts = take_excerpts(samples, target, samples.test == k, most=PER_TEST)
+        mine = samples.test == k
+        rows = np.flatnonzero(mine)
+        prints = Prints(
+            interval=samples.interval(mine),
+            learned=((int(rows[0]), int(rows[-1]) + 1),),
+            steps={},
+            runs=(),
+            excerpts=take_excerpts(samples, target, mine, most=PER_TEST),
+            curves=take_curves(samples, target, mine),
+        )
         for later in range(k + 1, len(samples.test_names)):
-            _add_copies(source, excerpts, [(int(rows[0]), int(rows[-1]) + 1)], samples, target, later)
+            _add_copies(source, prints, samples, target, later)
     return source
 
 
-def _add_copies(
-    source: IntArray,
-    excerpts: Sequence[Excerpt],
-    learned: Sequence[tuple[int, int]],
-    samples: Samples,
-    target: int,
-    test: int,
-) -> None:
-    """Write into `source` the rows of a test that are altered copies, unless true copies in it are known."""
+def _add_copies(source: IntArray, prints: Prints, samples: Samples, target: int, test: int) -> None:
+    """Write into `source` the rows of a test that are altered copies; excerpts only if no true copies are known."""
     rows = np.flatnonzero(samples.test == test)
-    if excerpts and (source[rows] < 0).all():
-        source[rows] = find_excerpts(excerpts, learned, samples, target, rows)
+    if prints.excerpts and (source[rows] < 0).all():
+        source[rows] = find_excerpts(prints.excerpts, prints.learned, samples, target, rows)
+    if prints.curves and (new := source[rows] < 0).any():
+        found = find_curves(prints.curves, prints.learned, prints.interval, samples, target, rows)
+        source[rows[new]] = found[new]
 
 
 def _overlap(prints: Prints, samples: Samples, target: int, interval: float, *, own: bool) -> IntArray:
