@@ -41,7 +41,7 @@ SCALES = (1, 2, 4)
 CERTAIN, LEAST_SHARE = 4.0, 0.15
 #: two tests with the same noise, by this factor, are from the same instruments; unless they are copies they differ by
 #: the noise of both, a copy by less than this share of it (variance)
-SAME_NOISE, INDEPENDENT = 1.5, 0.4
+SAME_NOISE, INDEPENDENT = 1.4, 0.4
 
 
 class _Map(NamedTuple):
