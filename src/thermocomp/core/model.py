@@ -284,7 +284,11 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         change = self.change(state, inputs)
         found = self._layers.advance(state.memory, change, 0.0)[1]
         far = self.distance(state, inputs) if self.band.widening else np.zeros(change.shape[:-1])
-        return self.widen(RunOutputs(state, state.deviation, state.outside, change, far, found))
+        return self.widen(
+            RunOutputs(
+                state=state, deviation=state.deviation, outside=state.outside, change=change, far=far, outputs=found
+            )
+        )
 
     def widen(self, run: RunOutputs) -> FloatArray:
         """Return the half-widths of the band, (...,), for the outputs of `run`."""

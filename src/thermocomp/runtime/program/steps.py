@@ -34,13 +34,12 @@ def step(s: Kept, w: Work, t: Constants) -> None:
     tell_time(s, w, t)
     for c in each("c", t.CHANNELS):
         w.given[c] = (w.value[c] >= -1e30) & (w.value[c] <= 1e30)  # False for NaN
-    w.stands = False
-    with when(t.has_speed):
-        w.stands = w.given[t.speed_channel] & (abs(w.value[t.speed_channel]) <= t.stopped_speed)
+    find_standstill(s, w, t)
     with when(w.passes):
         feeding.heed(s, w, t)
     with when(t.watched), when(w.passes):
         watching.believe(s, w, t)
+        find_standstill(s, w, t)  # by the substitute of a missing speed
         with when(t.has_feed):
             feeding.compare_predictions(s, w, t)
     with when(w.passes):
@@ -56,6 +55,14 @@ def step(s: Kept, w: Work, t: Constants) -> None:
             idle(s, w, t, k)
         with otherwise():
             s.idle[k] = 0.0
+
+
+@procedure
+def find_standstill(s: Kept, w: Work, t: Constants) -> None:
+    """Find out whether the spindle is known to be stopped."""
+    w.stands = False
+    with when(t.has_speed):
+        w.stands = w.given[t.speed_channel] & (abs(w.value[t.speed_channel]) <= t.stopped_speed)
 
 
 @procedure
