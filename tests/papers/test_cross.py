@@ -167,7 +167,6 @@ def test_methods_are_known_and_unknown_ones_refused() -> None:
         cross.run(0, methods=["olss"], experiments=[])
 
 
-@pytest.mark.long
 def test_a_measured_machine(shared_data: Path) -> None:
     """fl_thermal, every fifth row: least squares fits four times better than it keeps, a memory keeps what it fits."""
     every = files.read(shared_data / "fl_thermal" / "recording.csv")
