@@ -9,8 +9,9 @@ import pytest
 
 from thermocomp.papers.chen1996 import part
 from thermocomp.papers.chen1996.anywhere import WITHOUT, UnseenTest, left
-from thermocomp.papers.chen1996.part import PLACES, inspect, measure, mill
-from thermocomp.papers.chen1996.volume import DYNAMIC, MRA, NET
+from thermocomp.papers.chen1996.part import PLACES, Part, inspect, measure, mill
+from thermocomp.papers.chen1996.unseen import MRA, NET
+from thermocomp.papers.chen1996.volume import DYNAMIC
 from thermocomp.runtime.geometry.volumetric import ThermalStates
 from thermocomp.virtual.axes import STATIONS
 from thermocomp.virtual.centre import MachiningCentre
@@ -42,7 +43,7 @@ class Corrected:
 
 def day(gains: Mapping[str, float], growth: float = -60.0, screw: float = 100.0) -> UnseenTest:
     """Return a day of six hours on which spindle and screw of Y grow: Z at the end [um], slope of Y [um/m]."""
-    time = 600.0 * np.arange(37)
+    time = 600.0 * np.arange(37, dtype=np.float64)
     warm = time / time[-1]
     observables = np.zeros((len(time), len(NAMES)))
     observables[:, NAMES.index("z")] = growth * warm
@@ -71,6 +72,7 @@ def test_a_length_and_a_depth_are_those_that_the_machine_has_grown() -> None:
         grown = cold[2 * k + 1, 1] - cold[2 * k, 1] + 100.0 * 0.450 * hours
         assert found.lengths[WITHOUT][:, k] == pytest.approx(grown, abs=0.05)
     assert found.depths[WITHOUT][:, 0] == pytest.approx(-60.0 * hours, abs=0.05)
+    assert found.true[MRA] == pytest.approx(found.largest[MRA])
     assert found.depths[WITHOUT][:, 3] == pytest.approx(cold[3, 2] - cold[0, 2] - 60.0 * hours, abs=0.05)
 
 
@@ -86,13 +88,22 @@ def test_the_factors_are_those_of_the_paper(gain: float, holds: tuple[bool, bool
         assert {i for c in claims for i in c.ids} == {"C-37"}
 
 
+def test_lengths_and_depths_have_gains_of_their_own() -> None:
+    one = np.ones((1, 1))
+    found = Part({WITHOUT: 10 * one, MRA: -2 * one}, {WITHOUT: 30 * one, MRA: 3 * one}, {})
+    assert found.gain(MRA) == (5.0, 10.0)
+
+
 def test_the_measurement_has_the_uncertainty_that_is_stated() -> None:
     rng = np.random.default_rng(0)
     found = np.array([measure(np.zeros((1, len(PLACES), 5, 3)), rng)[0] for _ in range(4000)])
     assert np.std(found[:, 1, 1] - found[:, 0, 1]) == pytest.approx(part.uncertainty(450.0), rel=0.05)
     assert np.std(found[:, 1, 2] - found[:, 0, 2]) == pytest.approx(part.uncertainty(0.0), rel=0.05)
     assert part.uncertainty(450.0) == pytest.approx(0.95, abs=0.01)
-    (claim, _) = part.claims(inspect([day({MRA: 5.0, NET: 5.0})], 0))
+    found_day = inspect([day({MRA: 5.0, NET: 5.0})], 0)
+    assert found_day.true[WITHOUT] != found_day.largest[WITHOUT]
+    (claim, _) = part.claims(found_day)
+    assert f"up to {found_day.true[MRA][0]:.1f} um, 5.0 times less" in claim.finding
     assert "uncertainty of the measurement 1.0 um" in claim.text
 
 

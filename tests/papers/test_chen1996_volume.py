@@ -10,7 +10,8 @@ from thermocomp.core.components import COMPONENTS
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.papers.chen1996 import anywhere, setup, volume
 from thermocomp.papers.chen1996.anywhere import LINES, WITHOUT, Volume
-from thermocomp.papers.chen1996.volume import AVERAGED, DYNAMIC, MRA, NET, screened
+from thermocomp.papers.chen1996.unseen import MRA, NET
+from thermocomp.papers.chen1996.volume import AVERAGED, DYNAMIC, screened
 from thermocomp.virtual import datasets as virtual
 
 

@@ -135,7 +135,7 @@ def predict(learned: LearnedVolume, seed: int) -> list[UnseenTest]:
     found = []
     for test in simulate(virtual.find_experiment("volumetric-new"), seed=seed, whole=True):
         recording = with_sensors(virtual.make_recording(test))
-        table = {name: column.to_numpy() for name, column in recording.table.items()}
+        table = {c.name: recording.table[c.name].to_numpy() for c in recording.channels}
         states = {method: model.replay(recording.time, table) for method, model in models.items()}
         assert test.observables is not None
         found.append(UnseenTest(test.observables, recording.time, states))

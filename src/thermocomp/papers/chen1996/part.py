@@ -42,18 +42,18 @@ class Part:
         Distances along Y of two walls milled in the same hour, minus nominal, by type of compensation [um].
     depths : mapping of str to ndarray of shape (n_millings, 4)
         Heights of the floors above the floor milled at the start of the test, minus nominal [um].
+    true : mapping of str to (float, float)
+        Largest magnitudes of the true errors of length and depth [um].
     """
 
     lengths: Mapping[str, FloatArray]
     depths: Mapping[str, FloatArray]
+    true: Mapping[str, tuple[float, float]]
 
     @cached_property
     def largest(self) -> dict[str, tuple[float, float]]:
         """Largest magnitudes of the errors of length and depth, by type of compensation [um]."""
-        return {
-            name: (float(np.abs(length).max()), float(np.abs(self.depths[name]).max()))
-            for name, length in self.lengths.items()
-        }
+        return _largest(self.lengths, self.depths)
 
     def gain(self, name: str) -> tuple[float, float]:
         """Return the factors by which a method reduces the largest error of length and of depth."""
@@ -73,13 +73,24 @@ def inspect(tests: Sequence[UnseenTest], seed: int) -> Part:
     """
     rng = np.random.default_rng(seed)
     names = (WITHOUT, *tests[0].states)
-    lengths, depths = [], []
+    measured, true = [], []
     for test in tests:
         rows = [0, *np.flatnonzero(np.diff(test.time // HOURLY, prepend=0.0)).tolist()]
-        parts = np.stack([measure(mill(test, name, rows), rng) for name in names])
-        lengths.append(parts[:, 1:, 1::2, 1] - parts[:, 1:, ::2, 1])
-        depths.append(parts[:, 1:, :, 2] - parts[:, :1, :1, 2])
-    return Part(*(dict(zip(names, np.concatenate(found, axis=1), strict=True)) for found in (lengths, depths)))
+        parts = [mill(test, name, rows) for name in names]
+        true.append(np.stack([milled.mean(axis=2) for milled in parts]))
+        measured.append(np.stack([measure(milled, rng) for milled in parts]))
+    return Part(*_dimensions(names, measured), true=_largest(*_dimensions(names, true)))
+
+
+def _dimensions(names: Sequence[str], parts: Sequence[FloatArray]) -> tuple[dict[str, FloatArray], ...]:
+    """Return the errors of lengths and depths from surfaces of shape (n_names, n_rows, n_places, 3), one per day."""
+    lengths = np.concatenate([p[:, 1:, 1::2, 1] - p[:, 1:, ::2, 1] for p in parts], axis=1)
+    depths = np.concatenate([p[:, 1:, :, 2] - p[:, :1, :1, 2] for p in parts], axis=1)
+    return dict(zip(names, lengths, strict=True)), dict(zip(names, depths, strict=True))
+
+
+def _largest(lengths: Mapping[str, FloatArray], depths: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
+    return {name: (float(np.abs(e).max()), float(np.abs(depths[name]).max())) for name, e in lengths.items()}
 
 
 def mill(test: UnseenTest, name: str, rows: Sequence[int]) -> FloatArray:
@@ -135,9 +146,12 @@ claims = Claims[Part](__name__)
 
 
 def _judged(found: Part, which: int) -> Facts:
-    best = max(PAPERS, key=lambda name: found.gain(name)[which])
-    after = [(name, e[which], found.gain(name)[which]) for name, e in found.largest.items() if name != WITHOUT]
-    return {"none": found.largest[WITHOUT][which], "after": after, "best": found.gain(best)[which]}
+    gains = {name: found.gain(name)[which] for name in found.lengths if name != WITHOUT}
+    best = max(PAPERS, key=gains.__getitem__)
+    true, none = found.true[best][which], found.true[WITHOUT][which]
+    facts: Facts = {"none": found.largest[WITHOUT][which], "best": gains[best], "closest": best, "beyond": True}
+    facts |= {"after": [(name, found.largest[name][which], gain) for name, gain in gains.items()]}
+    return facts | {"true": true, "times": none / true if true else np.inf, "most": max(gains.values())}
 
 
 @claims.facts
@@ -152,7 +166,7 @@ def _depth(found: Part) -> Facts:
 
 def numbers(found: Part) -> dict[str, float]:
     """Return the key numbers: largest errors of length and depth by method [um]."""
-    made = {}
+    made: dict[str, float] = {}
     for name, (length, depth) in found.largest.items():
         short = "none" if name == WITHOUT else name.lower()
         made |= {f"part_length_{short}_um": length, f"part_depth_{short}_um": depth}
