@@ -210,8 +210,8 @@ assert numbers["volume_gain_averaged"] >= 10.0 > numbers["volume_gain_net"]
 # A part on a measuring machine
 # -----------------------------
 #
-# The paper's last numbers are those of a cut part. Here walls and floors are milled every hour on the same two days, and
-# measured point by point with the uncertainty of a coordinate measuring machine.
+# The paper's last numbers are those of a cut part. Here walls and floors are milled every hour on the same two days,
+# and measured point by point with the uncertainty of a coordinate measuring machine.
 
 tell("C-37")
 show(-1)

@@ -109,6 +109,23 @@ def test_a_tilt_needs_a_second_tool_length() -> None:
         identify_components(MILL, longer, np.zeros(len(longer)))
 
 
+@pytest.mark.parametrize(
+    ("code", "names", "advice"),
+    [
+        ("w Y' X' b Z (C1) t", "X0C, XOX and XOY", "between Y and X, between X and bed"),
+        ("XFZ", "X0C and XOX", "X and bed"),
+    ],
+)
+def test_other_structures(code: str, names: str, advice: str) -> None:
+    """C-01: a cross table, and a machine without Y; the default components are those that exist."""
+    structure = Structure.parse(code)
+    machine = replace(MILL, structure=structure, axes=tuple(a for a in AXES if a.name in structure.axes))
+    with pytest.raises(FitError, match=f"{names} cannot be separated: measure also (between )?{advice}"):
+        identify_components(machine, nest(), np.zeros(15))
+    found = identify_components(machine, [Displacement("X", TEST, between=("X", "bed"))], [7.0], codes=["XOX"])
+    assert found["XOX"] == pytest.approx(7.0)
+
+
 def test_known_components_are_taken_off() -> None:
     """An angle of X, known from a laser, moves the tip by its lever; a squareness is identified as well."""
     values = planted(3, np.random.default_rng(2))

@@ -79,10 +79,13 @@ def inspect(tests: Sequence[UnseenTest], seed: int) -> Part:
         parts = [mill(test, name, rows) for name in names]
         true.append(np.stack([milled.mean(axis=2) for milled in parts]))
         measured.append(np.stack([measure(milled, rng) for milled in parts]))
-    return Part(*_dimensions(names, measured), true=_largest(*_dimensions(names, true)))
+    lengths, depths = _dimensions(names, measured)
+    return Part(lengths=lengths, depths=depths, true=_largest(*_dimensions(names, true)))
 
 
-def _dimensions(names: Sequence[str], parts: Sequence[FloatArray]) -> tuple[dict[str, FloatArray], ...]:
+def _dimensions(
+    names: Sequence[str], parts: Sequence[FloatArray]
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return the errors of lengths and depths from surfaces of shape (n_names, n_rows, n_places, 3), one per day."""
     lengths = np.concatenate([p[:, 1:, 1::2, 1] - p[:, 1:, ::2, 1] for p in parts], axis=1)
     depths = np.concatenate([p[:, 1:, :, 2] - p[:, :1, :1, 2] for p in parts], axis=1)

@@ -18,7 +18,7 @@ from thermocomp.core.machine import Machine, Vector
 from thermocomp.core.structure import Structure
 from thermocomp.runtime.geometry.kinematics import INDEX, Kinematics
 
-#: default components: the 11 scalar ones that Chen adds to the 21 known ones (C-01)
+#: the 11 scalar components that Chen adds to the 21 known ones (C-01)
 THERMAL = tuple(c.code for c in COMPONENTS if c.group in ("spindle", "origin"))
 #: a combination of components is not determined if an error of 1 um of the readings changes it by more [um, urad]
 AMPLIFIED = 100.0
@@ -81,7 +81,7 @@ def identify_components(
     readings: Sequence[Displacement],
     values: ArrayLike,
     *,
-    codes: Sequence[str] = THERMAL,
+    codes: Sequence[str] | None = None,
     known: ArrayLike | None = None,
     uncertainty: float = 0.5,
 ) -> IdentifiedComponents:
@@ -96,7 +96,8 @@ def identify_components(
     values : array-like of shape (..., n_readings)
         Displacements in one or several thermal states, relative to the reference state [um].
     codes : sequence of str
-        Scalar components to identify. Default: two tilts and three drifts of the spindle, six shifts of references.
+        Scalar components to identify. Default: two tilts and three drifts of the spindle, and the shifts of the
+        references of X and Y, if the machine has them.
     known : array-like of shape (..., n_readings, 32), optional
         Known components at the position of each reading, such as ``field.components([r.at for r in readings])``; those
         of `codes` are ignored. Default: zero.
@@ -119,6 +120,8 @@ def identify_components(
     measured = np.asarray(values, dtype=np.float64)
     if measured.shape[-1:] != (len(readings),) or not np.isfinite(measured).all():
         raise InputError(f"expected {len(readings)} finite displacements per state, one for each reading")
+    if codes is None:
+        codes = [code for code in THERMAL if {*BY_CODE[code].axes} <= {*machine.structure.axes}]
     columns = [_column(code, machine) for code in codes]
     effects = effects_of_components(machine, readings)
     design = effects[:, columns]
