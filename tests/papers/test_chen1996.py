@@ -16,6 +16,7 @@ from thermocomp.papers.chen1996 import law as chen1996_law
 from thermocomp.papers.chen1996 import setup as chen1996_setup
 from thermocomp.papers.chen1996 import slope as chen1996_slope
 from thermocomp.papers.chen1996 import unseen as chen1996_unseen
+from thermocomp.papers.chen1996 import volume as chen1996_volume
 from thermocomp.papers.chen1996.drift import LearnedDrift
 from thermocomp.papers.chen1996.slope import LearnedPositioning
 from thermocomp.papers.chen1996.unseen import DYNAMIC, MRA, NET, NONE, Unseen
@@ -24,7 +25,7 @@ from thermocomp.papers.study import Claim, Study
 from thermocomp.recordings.samples import Samples
 
 #: studies of the paper; its other ids are those of methods and data structures
-IDS = {f"C-{n:02d}" for n in (4, 5, 7, *range(9, 21), *range(22, 37)) if n != 21} | {"E-C9", "E-C12"}
+IDS = {f"C-{n:02d}" for n in (4, 5, 7, *range(9, 21), *range(22, 38)) if n != 21} | {"E-C9", "E-C12"}
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,8 @@ def quick() -> Iterator[None]:
         patch.setattr(chen1996_drift, "SWEEP", (5, 25))
         patch.setattr(chen1996_drift, "SWEEP_STARTS", 2)
         patch.setattr(chen1996_unseen, "DRAWS", 2)
-        patch.setattr(chen1996_law, "SigmoidNet", partial(SigmoidNet, n_epochs=150))
+        for module in (chen1996_law, chen1996_volume):
+            patch.setattr(module, "SigmoidNet", partial(SigmoidNet, n_epochs=150))
         for name, value in {"DAYS": 1, "DRAWS": 4, "FEWER": 2}.items():
             patch.setattr(chen1996_law, name, value)
         yield

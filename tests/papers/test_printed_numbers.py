@@ -73,6 +73,7 @@ PRINTED = (
     Printed("chen1996.setup.LATERAL", 92.4 / 7.2, "C-35", "abstract: from 92.4 to 7.2 um"),
     Printed("chen1996.setup.DEPTH", 196 / 8, "C-35", "abstract: from 196 to 8 um"),
     Printed("chen1996.drift.REMOVALS", 6, "C-17", "Fig. 2: steps 9, 13, 16, 24, 26, 27"),
+    Printed("chen1996.volume.PATTERNS", 810, "C-14", "section 3.2: 810 observation sets"),
     Printed("chen1996.unseen.NOISE", 0.4, "C-33", "section 5.2 [degC]"),
     # Wessel et al. 2004
     Printed("wessel2004.sets.PAPER_SETS", 511, "W-10", "Appendix B, all combinations"),
@@ -141,10 +142,11 @@ OURS = {
     "chen1996.anywhere": ("POINTS", "CLOSED", "MOST", "MIDDLE", "TOOLS"),
     "chen1996.drift": ("STARTS", "SWEEP", "SWEEP_STARTS"),
     "chen1996.law": ("LASER", "SENSOR", "MOST", "DAYS", "DRAWS", "FEWER", "POSITIONS", "OURS", "DESIGNS"),
+    "chen1996.part": ("TOOL", "PLACES", "PROBED", "HOURLY", "POINT", "SCALE"),
     "chen1996.setup": ("DRIFTS", "SPEED"),
     "chen1996.slope": ("STARTS",),
     "chen1996.unseen": ("DRAWS", "TESTS", "BETTER"),
-    "chen1996.volume": ("ROUND", "COLD"),
+    "chen1996.volume": ("PAPERS", "METHODS", "ROUND", "COLD", "SPINDLE"),
     "wessel2004.sets": ("TOLERANCE", "TOLERANCE_LARGER"),
     "wessel2004.tools": ("STRETCHES", "EPISODE"),
     "wessel2004.trial": ("SWEEPS", "LOOP_STEPS"),
@@ -174,6 +176,8 @@ CLAIMED: dict[str, str] = {
     "chen1996.unseen.tool_point": "10",  # C-35, abstract
     "chen1996.unseen.depth": "196 8",  # C-35, abstract
     "chen1996.anywhere.first_order": "1",  # C-05, section 2.2: the first-order term
+    "chen1996.part.lateral": "92.4 7.2",  # C-37, conclusion 5
+    "chen1996.part.depth": "196 8",  # C-37, conclusion 5
     "wessel2004.spindle.series": "199 100",  # W-06, section III
     "wessel2004.spindle.fits": "0.9994",  # W-06, section III
     "wessel2004.sets.calculated": "511 35259 129",  # W-10, Appendix B

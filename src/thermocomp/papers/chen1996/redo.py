@@ -1,10 +1,10 @@
-"""Chen, Yuan, Ni 1996: drifts of the spindle, positioning of Y, new observations, and the whole work volume."""
+"""Chen, Yuan, Ni 1996: drifts of the spindle, positioning of Y, new observations, the whole work volume, and a part."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from thermocomp.papers.chen1996 import anywhere, drift, slope, unseen, volume
+from thermocomp.papers.chen1996 import anywhere, drift, part, slope, unseen, volume
 from thermocomp.papers.chen1996.setup import exhibits
 from thermocomp.papers.study import Figure, Part, Progress, Study
 
@@ -21,7 +21,10 @@ def run(seed: int, progress: Progress) -> Study:
     progress(0.6, "new observations, noise, a lost sensor")
     observed = unseen.observe(learned, new)
     progress(0.65, "the whole work volume")
-    volumes = anywhere.judge(volume.learn(first_week), second_week)
+    whole = volume.learn(first_week)
+    week = anywhere.predict(whole, second_week)
+    volumes = anywhere.judge(whole, week, second_week)
+    inspected = part.inspect(week, second_week)
     study = Study.of(
         "chen1996",
         TITLE,
@@ -34,6 +37,7 @@ def run(seed: int, progress: Progress) -> Study:
         Part(slope.judge(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
         Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),
         Part(anywhere.claims(volumes), anywhere.tables(volumes), anywhere.figures(volumes), anywhere.numbers(volumes)),
+        Part(part.claims(inspected), part.tables(inspected), (), part.numbers(inspected)),
     )
     progress(1.0, "done")
     return replace(study, figures=tuple(sorted(study.figures, key=_number)))

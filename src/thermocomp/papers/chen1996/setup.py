@@ -69,10 +69,14 @@ def recordings(experiment: str, seed: int, sensor_noise: float | None = None) ->
         given = {c.name for c in recording.channels}
         known = {new: old for new, old in {**SENSORS, **DRIFTS, **SPEED}.items() if old in given}
         rest = {c.name: c.name for c in recording.channels if c.name not in known.values()}
-        named = rename_channels(recording, {old: new for new, old in known.items()} | rest)
-        mean = dict.fromkeys(COLUMN, 1 / len(COLUMN))
-        found.append(add_derived_channel(named, Channel("T5", "temperature", "degC", "column, average"), mean))
+        found.append(with_column(rename_channels(recording, {old: new for new, old in known.items()} | rest)))
     return found
+
+
+def with_column(recording: Recording) -> Recording:
+    """Return the recording with T5, the average column temperature, as an additional channel (C-11)."""
+    mean = dict.fromkeys(COLUMN, 1 / len(COLUMN))
+    return add_derived_channel(recording, Channel("T5", "temperature", "degC", "column, average"), mean)
 
 
 def with_differences(recording: Recording) -> Recording:
