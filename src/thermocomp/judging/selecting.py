@@ -107,7 +107,10 @@ def _by_correlation(samples: Samples, settings: Settings) -> Choice:
         raise FitError("screening needs at least one temperature and 3 complete rows")
     found = screen(samples.change()[rows][:, temperatures], samples.deviations[rows], settings.most("correlation"))
     if not found.kept:
-        raise FitError(f"no temperature varies together with {' or '.join(targets)}")
+        raise FitError(
+            f"no temperature varies together with {' or '.join(targets)}; use recordings in which they change"
+        )
+    still = [t for t, r in zip(targets, found.relevance.T, strict=True) if np.isnan(r).all()]
     shown: list[tuple[Cell, ...]] = []
     for place, j in enumerate(found.order, start=1):
         near = found.nearest(j)
@@ -131,6 +134,7 @@ def _by_correlation(samples: Samples, settings: Settings) -> Choice:
         notes=(
             "A first screening: correlation is no error on unseen cycles. Choose among these sensors by another "
             "method, with --inputs.",
+            *(f"{t} is constant: it was not considered." for t in still),
         ),
         details=found,
     )

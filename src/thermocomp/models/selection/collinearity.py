@@ -1,4 +1,4 @@
-"""Collinearity of variables, correlation of each with the error (Hwang, section 3.2.3), and screening by both (Chen)."""
+"""Collinearity of variables, their correlation with the error (Hwang, section 3.2.3), and screening by both (Chen)."""
 
 from dataclasses import dataclass
 
