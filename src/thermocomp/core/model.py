@@ -264,14 +264,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         return self.joint.distance(bound_readings(inputs) - state.reference)
 
     def half_width(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return the half-width of the band about the deviation of a reading.
-
-        Parameters
-        ----------
-        state : State
-            State after the step that processed the reading.
-        inputs : ndarray of shape (..., n_inputs)
-            The reading.
+        """Return the half-width of the band about the deviation of a reading; state and inputs as of `distance`.
 
         Returns
         -------
@@ -301,14 +294,7 @@ class ErrorModel(Gated, Replayable, ModelFamily):
         return self.band.half_width(run.change, spread, self.thresholds.stopped_speed, run.far) + kept
 
     def directions(self, state: State, inputs: FloatArray) -> FloatArray:
-        """Return the directions in which the regressions averaged by the model differ.
-
-        Parameters
-        ----------
-        state : State
-            State after the step that processed the reading.
-        inputs : ndarray of shape (..., n_inputs)
-            The reading.
+        """Return the directions in which the averaged regressions differ; state and inputs as of `distance`.
 
         Returns
         -------

@@ -1,0 +1,37 @@
+"""Every numbered equation, table and figure of the papers has a place here, or a reason why not."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = ROOT / "src" / "thermocomp"
+#: numbered equations, tables and figures of each paper
+COUNTS = {"C": (10, 2, 17), "W": (6, 0, 9), "H": (9, 3, 6), "P": (1, 0, 4), "T": (8, 0, 6)}
+#: equations of an appendix
+FURTHER = {"W": ["Eq. A1", "Eq. A2", "Eq. A3", "Eq. A4", "Eq. A5"]}
+GROUPS = tomllib.loads((ROOT / "docs" / "exhibits.toml").read_text(encoding="utf-8"))
+ENTRIES = {f"{p} {k}": entry for p, group in GROUPS.items() for k, entry in group.items() if k != "title"}
+
+
+@pytest.mark.parametrize("paper", COUNTS)
+def test_none_is_missing(paper: str) -> None:
+    kinds = zip(("Eq.", "Table", "Fig."), COUNTS[paper], strict=True)
+    wanted = [f"{kind} {k}" for kind, n in kinds for k in range(1, n + 1)]
+    assert sorted(GROUPS[paper]) == sorted([*wanted, *FURTHER.get(paper, ()), "title"])
+
+
+@pytest.mark.parametrize("key", ENTRIES)
+def test_its_place_is_there(key: str) -> None:
+    entry = ENTRIES[key]
+    assert {"what"} < {*entry} <= {"what", "code", "study", "reason"}
+    assert all(entry.values())
+    for file in entry.get("code", ()):
+        assert (CODE / file).is_file(), file
+    for place in entry.get("study", ()):
+        study, kind, name = place.split(".")
+        shown = tomllib.loads((CODE / "papers" / study / "exhibits.toml").read_text(encoding="utf-8"))
+        assert name in shown[kind], place
+        page = (ROOT / "docs" / "papers" / f"plot_{study}.py").read_text(encoding="utf-8")
+        assert kind == "tables" or any(f'"{each}"' in page for each in (name, name.removeprefix(f"{study}-")))
