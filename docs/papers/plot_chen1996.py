@@ -69,13 +69,18 @@ print(f"{sum(c.verdict == 'yes' for c in judged)} of {len(judged)} claims hold o
 # 810 rows from five tests
 # ------------------------
 #
-# 600, 1000, 1500, 2100 and 2600 1/min, each for 6 h, followed by 10 h at standstill; a row every 6 minutes. Of 24
-# temperatures, those of the paper's Table 1 are used. Differences such as T6-T7, right minus left at the column's
-# front, are separate variables, because they bend the column.
+# 600, 1000, 1500, 2100 and 2600 1/min, each for 6 h, followed by 10 h at standstill; a row every 6 minutes. A first
+# screening takes the 24 temperatures of the machine to nine, by their correlation with the drifts and with each other;
+# the paper gives no rule, and also used experience. These are not the nine of its Table 1. As Table 2 and Eq. 5 name
+# variables of Table 1, those are used below; a regression on the nine of the screening is compared with them on the new
+# tests. Differences such as T6-T7, right minus left at the column's front, are separate variables, because they bend
+# the column.
 
 tell("C-14", "C-11", "C-09")
 show(0)
 assert numbers["rows"] == 810
+assert (numbers["screening_candidates"], numbers["screening_kept"]) == (24, 9)
+assert numbers["screening_returned"] < 8
 assert [numbers[f"candidates_{t}"] for t in "xyz"] == [20, 35, 20]
 
 # %%
@@ -115,17 +120,32 @@ assert numbers["parameters_net"] == 263
 draw("fig10", "fig11", "fig12")
 
 # %%
+# Eq. 5
+# -----
+#
+# The paper prints the regression of x, Eq. 5, with its R2 and standard error, which imply a drift of 97 um (RMS). The
+# virtual machine moves in x by some 9 um, less than the standard error of Chen's fit: what this page says of x is about
+# effects that would be noise on his machine. So Eq. 5 is also imposed on the temperatures of the 810 rows, with noise
+# of the printed standard error: as printed, and multiplied so that the drift has the implied size. The regression of
+# the latter has the paper's R2, and yet other terms than Eq. 5 in most draws: a good fit does not identify a law.
+
+tell("C-18")
+show(6)
+assert abs(numbers["eq5_r2"] - 0.988) < 0.001
+assert numbers["eq5_terms_as_printed"] < numbers["eq5_terms"] < 7
+
+# %%
 # Position and temperature: the Y axis
 # ------------------------------------
 #
 # A laser measures the positioning error of Y along its travel, 51 times in a warm-up and cool-down. The cold profile is
 # geometric; the thermal part added to it is nearly a straight line whose slope changes with time. So one number, the
-# slope, is modelled in place of twelve. Fig. 6: some of the profiles. Fig. 1: the pitch of Y, measured at the same
+# slope, is modelled in place of twelve. Fig. 6: some of the profiles. Fig. 1: the yaw of Y, measured at the same
 # time.
 
 draw("fig6", "fig1")
 tell("C-22", "C-05")
-show(6, 7, 8)
+show(7, 8, 9)
 assert numbers["slope_sets"] == 51
 assert numbers["lateral_measured_um"] < 0.2 * numbers["lateral_none_um"]
 
@@ -157,7 +177,7 @@ draw("fig7", "fig13")
 # the law.
 
 tell("C-23", "C-24", "C-27")
-show(9, 10)
+show(10, 11)
 assert numbers["law_whole"] >= 0.95
 assert numbers["law_whole_cold"] < 0.8
 assert numbers["law_whole_one_warm_up"] < 0.2
@@ -172,7 +192,7 @@ assert numbers["law_elsewhere_mra"] < numbers["law_elsewhere_net"]
 
 draw("fig14", "fig15")
 tell("C-32")
-show(11)
+show(12)
 assert numbers["rms_z_1250_net_um"] < 0.5 * numbers["rms_z_1250_none_um"]
 assert numbers["rms_z_random_dynamic_um"] < 0.3 * numbers["rms_z_random_none_um"]
 

@@ -26,13 +26,13 @@ def drift(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("method", ["grouping", "partial-f", "stepwise", "subsets", "ace", "pareto"])
+@pytest.mark.parametrize("method", ["correlation", "grouping", "partial-f", "stepwise", "subsets", "ace", "pareto"])
 def test_every_method_for_people_and_programs(
     drift: Path, method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page = tmp_path / "sensors.html"
     line = ["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1"]
-    line += ["--max-sensors", "2"] if method in ("subsets", "ace", "pareto") else []
+    line += ["--max-sensors", "2"] if method in ("correlation", "subsets", "ace", "pareto") else []
     assert run([*line, "-o", str(page)]) == 0
     said = capsys.readouterr().out
     assert "x_um: t" in said
@@ -63,7 +63,7 @@ def test_refusals(drift: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["--method", "ace", "--threshold", "0.5"], "--threshold is for --method grouping, not for ace"),
         (
             ["--method", "grouping", "--max-sensors", "4"],
-            "--max-sensors is for --method subsets or ace or pareto, not for",
+            "--max-sensors is for --method subsets or ace or pareto or correlation, not for",
         ),
         (["--holm"], "--holm is for --method ace, not for pareto"),
         (["--seconds", "5"], "--seconds is for --method subsets, not for pareto"),
@@ -134,7 +134,7 @@ def test_one_thermal_cycle_is_enough_for_most(tmp_path: Path, capsys: pytest.Cap
     part = replace(plain, table=plain.table.iloc[:200], time=plain.time[:200], cycles=plain.cycles[:1])
     path = tmp_path / "one.csv"
     recordings.write(part, path)
-    for method in ("grouping", "partial-f", "stepwise", "subsets", "ace"):
+    for method in ("correlation", "grouping", "partial-f", "stepwise", "subsets", "ace"):
         assert run(["select", str(path), "--target", "x_um", "--method", method, "--jobs", "1"]) == 0, method
     capsys.readouterr()
     assert run(["select", str(path), "--target", "x_um", "--jobs", "1"]) == 2

@@ -1,5 +1,6 @@
 """Every selector brought to one form: sensors that exist, tables that add up, and what the user should know."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,8 @@ from thermocomp.models.selection.subsets import best_subsets
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 
-METHODS = ("grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")
+METHODS = ("correlation", "grouping", "partial-f", "stepwise", "subsets", "ace", "pareto")
+TOGETHER = ("correlation", "ace", "pareto")
 SETTINGS = Settings(max_sensors=3, models=["ols"])
 
 
@@ -33,7 +35,7 @@ def choices(crowd: Samples) -> dict[str, tuple[Choice, ...]]:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_chooses_temperatures_that_exist(choices: dict[str, tuple[Choice, ...]], method: str) -> None:
     found = choices[method]
-    assert [c.target for c in found] == (["x_um, z_um"] if method in ("ace", "pareto") else ["x_um", "z_um"])
+    assert [c.target for c in found] == (["x_um, z_um"] if method in TOGETHER else ["x_um", "z_um"])
     for c in found:
         assert c.method == method
         assert set(c.sensors) <= {f"t{k}_C" for k in range(1, 7)}
@@ -66,6 +68,25 @@ def test_grouping_puts_the_repeating_sensors_together(choices: dict[str, tuple[C
     assert str(sensors).split() == list(choice.sensors)
     ends = [row[:2] for row in thresholds.rows]
     assert all(a[1] == b[0] for a, b in pairwise(ends))  # no gap between the rows
+
+
+def test_screening_is_for_all_targets_together(choices: dict[str, tuple[Choice, ...]], crowd: Samples) -> None:
+    """C-11: t4_C and t5_C repeat t1_C."""
+    (choice,) = choices["correlation"]
+    (shown,) = choice.tables
+    assert shown.columns[:4] == ("kept", "sensor", "r x_um", "r z_um")
+    assert [row[0] for row in shown.rows] == [1, 2, 3, None, None, None]
+    assert tuple(str(row[1]) for row in shown.rows[:3]) == choice.sensors
+    assert len({"t1_C", "t4_C", "t5_C"} & {*choice.sensors}) == 1
+    r = np.corrcoef(crowd.change()[:, [c.name for c in crowd.inputs].index(choice.sensors[0])], crowd.deviations.T)
+    assert shown.rows[0][2:4] == pytest.approx(tuple(r[0, 1:]))
+    still = replace(crowd, deviations=crowd.deviations * [1.0, 0.0])
+    (alone,) = selecting.select("correlation", still, splits.leave_one_cycle_out(crowd), SETTINGS)
+    assert alone.notes[-1] == "z_um is constant: it was not considered."
+    with pytest.raises(FitError, match="no temperature varies together with x_um or z_um"):
+        selecting.select(
+            "correlation", replace(crowd, deviations=0 * crowd.deviations), splits.leave_one_cycle_out(crowd), SETTINGS
+        )
 
 
 def test_a_reference_is_needed_too(crowd: Samples) -> None:

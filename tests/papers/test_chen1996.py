@@ -277,11 +277,16 @@ def test_the_slope_is_that_of_the_thermal_part(slopes: LearnedPositioning) -> No
 
 
 def test_profiles_are_those_of_the_test(slopes: LearnedPositioning) -> None:
+    """C-36: Fig. 1 shows the yaw of Y."""
     np.testing.assert_array_equal(slopes.learned.position, np.arange(0, 551, 50))
-    assert slopes.learned.values.shape == slopes.other.values.shape == slopes.pitch.values.shape == (51, 12)
+    assert slopes.learned.values.shape == slopes.other.values.shape == slopes.yaw.values.shape == (51, 12)
     (recording,) = chen1996_setup.recordings("chen1996-slope", 1)
     np.testing.assert_array_equal(slopes.learned.values[:, 3], recording.table["y_laser_150_um"])
-    np.testing.assert_array_equal(slopes.pitch.values[:, 3], recording.table["y_pitch_150_urad"])
+    np.testing.assert_array_equal(slopes.yaw.values[:, 3], recording.table["ECY_150_urad"])
+    (figure,) = [f for f in chen1996_slope.figures(slopes) if f.key == "chen1996-fig1"]
+    (panel,) = figure.panels
+    np.testing.assert_array_equal(panel.curves[0].y, slopes.yaw.values[0])
+    assert panel.ylabel == "yaw of Y [urad]"
 
 
 def test_the_cold_profile_is_a_polynomial_of_fifth_order(slopes: LearnedPositioning) -> None:

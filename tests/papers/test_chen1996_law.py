@@ -72,10 +72,10 @@ def test_the_law_comes_back_whole(days: list[list[FloatArray]]) -> None:
 
 def test_shares_of_draws() -> None:
     more, fewer = {**EQ8, "T1": 0.1}, {t: c for t, c in EQ8.items() if t != "T3"}
-    recovery = Recovery(OURS, [EQ8, more, fewer, {**fewer, "T1": 0.1}])
+    recovery = Recovery(EQ8, [EQ8, more, fewer, {**fewer, "T1": 0.1}])
     assert (recovery.whole, recovery.missing, recovery.wrong) == (0.25, 0.5, 0.5)
     np.testing.assert_array_equal(recovery.coefficients, [list(EQ8.values())])
-    assert np.isnan(Recovery(OURS, [fewer]).coefficients).all()
+    assert np.isnan(Recovery(EQ8, [fewer]).coefficients).all()
 
 
 def test_claims_can_fail(sought: Law) -> None:
@@ -83,10 +83,10 @@ def test_claims_can_fail(sought: Law) -> None:
     assert whole.holds
     assert near.holds
     assert (otherwise.holds, net.holds) == (None, None)
-    fewer = Recovery(OURS, [{t: c for t, c in EQ8.items() if t != "T3"}])
+    fewer = Recovery(EQ8, [{t: c for t, c in EQ8.items() if t != "T3"}])
     whole, _, near, _ = law.claims(replace(sought, recoveries={**sought.recoveries, OURS: fewer}))
     assert (whole.holds, near.holds) == (False, False)
-    far = Recovery(OURS, [{t: c + 1.0 for t, c in EQ8.items()}])
+    far = Recovery(EQ8, [{t: c + 1.0 for t, c in EQ8.items()}])
     assert not law.claims(replace(sought, recoveries={**sought.recoveries, OURS: far}))[2].holds
 
 

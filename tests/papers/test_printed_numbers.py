@@ -58,6 +58,7 @@ PRINTED = (
     Printed("chen1996.drift.R2_X", 0.988, "C-19", "Fig. 2, squared multiple R"),
     Printed("chen1996.drift.SEE_X", 10.628, "C-19", "Fig. 2, standard error of estimate"),
     Printed("chen1996.drift.EQ5", DELTA_X, "C-18", "Eq. 5, and the table of coefficients in Fig. 2"),
+    Printed("chen1996.screening.LEFT", 9, "C-11", "section 3.2: nine temperature measurements"),
     Printed("chen1996.drift.HIDDEN", 20, "C-26", "section 4.2: 9-20-3"),
     Printed("chen1996.law.HIDDEN", 8, "C-27", "section 4.3: 5-8-1"),
     Printed("chen1996.setup.COLUMN", ("T6", "T7", "T8", "T9"), "C-11", "Table 1: the four sides of the column"),
@@ -132,6 +133,7 @@ CRITERIA = (
 
 #: constants with a test of their own below
 COMPARED = {
+    "chen1996.equation5": ("IMPLIED",),
     "chen1996.setup": ("SENSORS", "TEMPERATURES", "DIFFERENCES", "EQ6"),
     "wessel2004.sets": ("PAPERS_OWN",),
     "hwang.setup": ("NAMES", "TABLE_3"),
@@ -141,6 +143,7 @@ COMPARED = {
 OURS = {
     "chen1996.anywhere": ("POINTS", "CLOSED", "MOST", "MIDDLE", "TOOLS"),
     "chen1996.drift": ("STARTS", "SWEEP", "SWEEP_STARTS"),
+    "chen1996.equation5": ("DRAWS",),
     "chen1996.law": ("LASER", "SENSOR", "MOST", "DAYS", "DRAWS", "FEWER", "POSITIONS", "OURS", "DESIGNS"),
     "chen1996.part": ("TOOL", "PLACES", "PROBED", "HOURLY", "POINT", "SCALE"),
     "chen1996.setup": ("DRIFTS", "SPEED"),
@@ -161,6 +164,10 @@ WHOLLY_OURS = ("precompensation.program",)
 
 #: numbers in the column "paper" of the claims that are written out there, in the order in which they stand
 CLAIMED: dict[str, str] = {
+    "chen1996.screening.table_1": "20",  # C-11, section 3.2
+    "chen1996.equation5.consistent": "2",  # R2
+    "chen1996.equation5.recovered": "20 7",  # C-10, C-20, section 3.2
+    "chen1996.equation5.moves": "2",  # R2
     "chen1996.drift.sets": "810",  # C-14, section 3.2 and Fig. 2
     "chen1996.drift.coefficients": "20 35 20",  # C-10, section 3.2
     "chen1996.drift.closely": "2",  # R2

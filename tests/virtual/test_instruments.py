@@ -91,11 +91,9 @@ def test_only_a_calculation_looks_into_a_shaft() -> None:
         thermometer(CENTRE, "t3", "shaft", perfect=False, noise=None)
 
 
-def test_the_pitch_of_y_is_an_angle() -> None:
-    pitch = displacement("p", CENTRE.probe("y_pitch_200"), perfect=False)
-    assert (pitch.sensor.channel.name, pitch.sensor.channel.quantity) == ("p_urad", "angle")
-    assert read(CENTRE, "y_pitch_200", **{"ay@0": 1.0, "ay@200": 5.0}) == 4.0
-    assert CENTRE.probe("y_pitch_0").reads == {}
+def test_the_yaw_of_y_is_an_angle() -> None:
+    yaw = displacement("p", CENTRE.probe("ECY_200"), perfect=False)
+    assert (yaw.sensor.channel.name, yaw.sensor.channel.quantity) == ("p_urad", "angle")
 
 
 def test_a_perfect_probe_has_no_errors() -> None:

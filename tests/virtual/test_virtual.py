@@ -185,7 +185,7 @@ def test_slopes_of_the_laser_profiles() -> None:
     warm = 1e3 * slopes[19]  # at the end of the run [um/m]
     assert abs(warm) > 20.0
     assert abs(1e3 * slopes[-1]) < 0.5 * abs(warm)
-    assert np.ptp(test.truth[:, -1]) > 1.0  # urad: the pitch of Y follows the bending column
+    assert np.ptp(test.truth[:, -1]) > 1.0  # urad: the yaw of Y follows the sides of the column (C-36)
 
 
 def test_axis_tests_warm_the_axis_that_moves() -> None:

@@ -288,7 +288,7 @@ def test_components_leave_the_older_recordings_as_they_were() -> None:
         observable=machine.model.observable[old],
         observables=tuple(machine.observables[k] for k in old),
     )
-    probes = ("nest", "x_laser", "y_laser", "z_laser", "y_pitch", "x_at_500", "z_at_40")
+    probes = ("nest", "x_laser", "y_laser", "z_laser", "x_at_500", "z_at_40")
     programme = Programme(name="t", sampling=600.0, segments=(SteadySegment(HOUR, WARM["both"]),), probes=probes)
     tests = [
         run(m, CENTRE, programme, np.random.default_rng(1), np.random.default_rng(2))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import pandas as pd
 
@@ -21,7 +21,7 @@ from thermocomp.recordings.recording import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SelectionMethod = Literal["pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"]
+SelectionMethod = Literal["pareto", "subsets", "correlation", "grouping", "partial-f", "stepwise", "ace"]
 #: settings of `select`, in addition to the recordings
 SelectionSettings = Settings
 
@@ -129,9 +129,10 @@ def select(
     ----------
     recordings, targets
         As for `compare`.
-    method : {'pareto', 'subsets', 'grouping', 'partial-f', 'stepwise', 'ace'}
+    method : {'pareto', 'subsets', 'correlation', 'grouping', 'partial-f', 'stepwise', 'ace'}
         Selection method; see the page :doc:`/methods` of the manual. pareto: trade-off between the error on unseen
-        cycles and the number of sensors; subsets: exact best subset of every size; grouping: correlation grouping
+        cycles and the number of sensors; subsets: exact best subset of every size; correlation: first screening of many
+        sensors by their correlation with the targets and with each other (Chen); grouping: correlation grouping
         (Hwang); partial-f and stepwise: partial F tests (of the stepwise 2017 paper, and of Chen); ace: maximal
         correlation (Wessel).
     inputs, split, leave_one, absolute, starts, zero_over, mapping, jobs, scheduler, progress
@@ -158,8 +159,8 @@ def select(
     <Selected: z_um: t_y_bearing_C, t_rear_seat_C, t_column_front_left_C (smallest residual mean square, 3.869 um^2,
     among the members of 3 of 4 groups).>
     """
-    if method not in ("pareto", "subsets", "grouping", "partial-f", "stepwise", "ace"):
-        raise InputError(f"method {method!r}: expected pareto, subsets, grouping, partial-f, stepwise or ace")
+    if method not in (known := get_args(SelectionMethod)):
+        raise InputError(f"method {method!r}: expected {', '.join(known[:-1])} or {known[-1]}")
     chosen = settings_of(Settings, settings, "select")
     chosen.check(method)
     listener = Listener(progress)

@@ -15,7 +15,7 @@ LOOKED_AT_BY = {
     "threshold": ("grouping",),
     "unsigned": ("grouping",),
     "reference": ("grouping",),
-    "max_sensors": ("subsets", "ace", "pareto"),
+    "max_sensors": ("subsets", "ace", "pareto", "correlation"),
     "seconds": ("subsets",),
     "criterion": ("subsets",),
     "models": ("pareto",),
@@ -44,7 +44,8 @@ class Settings:
     reference : str
         grouping: temperature that is subtracted from the others.
     max_sensors : int
-        subsets, ace, pareto: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto.
+        subsets, ace, pareto, correlation: maximum number of sensors. Default: 10 for subsets, 3 for ace, 6 for pareto,
+        9 for correlation.
     seconds : float
         subsets: approximate time limit of the search for the best sets [s]; the result names the sets that are not
         proven best by then.
@@ -80,7 +81,7 @@ class Settings:
         """Return the maximum number of sensors that a method may select."""
         if self.max_sensors is not None and self.max_sensors < 1:
             raise InputError(f"--max-sensors {self.max_sensors}: expected at least 1")
-        return self.max_sensors if self.max_sensors is not None else {"ace": 3, "pareto": 6}.get(method, 10)
+        return self.max_sensors or {"ace": 3, "pareto": 6, "correlation": 9}.get(method, 10)
 
 
 @dataclass(frozen=True)

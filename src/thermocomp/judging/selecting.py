@@ -8,10 +8,10 @@ from itertools import groupby
 import numpy as np
 from joblib import effective_n_jobs
 
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.judging import budget, maximal, pareto
 from thermocomp.judging.candidates import Candidates
-from thermocomp.judging.choice import Choice, Progress, Settings, Table
+from thermocomp.judging.choice import Cell, Choice, Progress, Settings, Table
 from thermocomp.judging.leaks import refuse_leaks
 from thermocomp.judging.pieces import elsewhere, explain
 from thermocomp.judging.splits import Judging
@@ -21,6 +21,7 @@ from thermocomp.models.numerics.stepwise import StepwiseStep
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection import grouping
+from thermocomp.models.selection.collinearity import screen
 from thermocomp.models.subsets import BestSubset
 from thermocomp.recordings.samples import Samples
 
@@ -34,7 +35,7 @@ def n_pieces(method: str, samples: Samples, judging: Judging, settings: Settings
         return budget.n_pieces(samples, judging, settings.models, settings.most("pareto"))
     if method == "ace":
         return len(samples.targets) * len(samples.cycle_names)
-    return len(samples.targets)
+    return 1 if method == "correlation" else len(samples.targets)
 
 
 def select(
@@ -53,6 +54,10 @@ def select(
         refuse_leaks(samples, judging)
     if method == "ace":
         return (maximal.choose(samples, settings, jobs=jobs, progress=progress),)
+    if method == "correlation":
+        screened = _by_correlation(samples, settings)
+        progress(f"{screened.target}: chosen")
+        return (screened,)
     choosers: dict[str, Callable[[Candidates], Choice]] = {
         "grouping": lambda c: _by_grouping(c, settings),
         "subsets": lambda c: _by_subsets(c, settings, jobs=jobs, progress=progress),
@@ -91,6 +96,48 @@ def select(
     if len(errors) == len(found):
         raise errors[0]
     return tuple(found)
+
+
+def _by_correlation(samples: Samples, settings: Settings) -> Choice:
+    """Screen by correlation with all targets together, and among the temperatures (C-11)."""
+    temperatures = [j for j, c in enumerate(samples.inputs) if c.quantity == "temperature"]
+    names, targets = [samples.inputs[j].name for j in temperatures], [t.name for t in samples.targets]
+    rows = samples.valid & np.isfinite(samples.deviations).all(axis=1)
+    if not temperatures or rows.sum() < 3:
+        raise FitError("screening needs at least one temperature and 3 complete rows")
+    found = screen(samples.change()[rows][:, temperatures], samples.deviations[rows], settings.most("correlation"))
+    if not found.kept:
+        raise FitError(
+            f"no temperature varies together with {' or '.join(targets)}; use recordings in which they change"
+        )
+    still = [t for t, r in zip(targets, found.relevance.T, strict=True) if np.isnan(r).all()]
+    shown: list[tuple[Cell, ...]] = []
+    for place, j in enumerate(found.order, start=1):
+        near = found.nearest(j)
+        alike = ("", None) if near is None else (names[near], float(found.likeness[near, j]))
+        kept = place if place <= len(found.kept) else None
+        shown.append((kept, names[j], *found.relevance[j].tolist(), *alike))
+    table = Table(
+        title="Correlation with the targets, and with the most similar sensor kept before",
+        columns=("kept", "sensor", *(f"r {t}" for t in targets), "most similar", "r"),
+        rows=tuple(shown),
+        caption="Each step keeps the sensor with the largest product of the share of a target that it explains and the "
+        "share of its own variance that the sensors kept before do not: r^2 (1 - r^2).",
+    )
+    return Choice(
+        method="correlation",
+        target=", ".join(targets),
+        sensors=tuple(names[j] for j in found.kept),
+        reason=f"{len(found.kept)} of {len(names)} temperatures that are correlated with a target and differ from each "
+        "other",
+        tables=(table,),
+        notes=(
+            "A first screening: correlation is no error on unseen cycles. Choose among these sensors by another "
+            "method, with --inputs.",
+            *(f"{t} is constant: it was not considered." for t in still),
+        ),
+        details=found,
+    )
 
 
 def _by_grouping(candidates: Candidates, settings: Settings) -> Choice:

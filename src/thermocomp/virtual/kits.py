@@ -19,7 +19,6 @@ from thermocomp.virtual.probes import (
     component,
     laser,
     make_squareness_probe,
-    pitch,
     station,
     station_name,
 )
@@ -127,8 +126,6 @@ class Kit:
             return VirtualProbe(" + ".join(f"{w:g} {n}" for n, w in name.items()), name)
         if name in self.probes:
             return self.probes[name]
-        if name in self.nests.get("y_pitch", ()):
-            return pitch(int(name.rpartition("_")[2]))
         six = re.fullmatch(r"(E[XYZABC][XYZ])(?:_z(\d+))?_(\d+)", name) if self.top_speed else None
         if six:
             code, z, at = six.groups()
@@ -206,7 +203,6 @@ CENTRE = Kit(
     nests={
         "nest": tuple(NEST),
         **{f"{a}_laser": tuple(f"{a}_laser_{p}" for p in STATIONS[a]) for a in AXES},
-        "y_pitch": tuple(f"y_pitch_{p}" for p in STATIONS["y"]),
         **{code: _profile(code) for code in COMPONENTS},
         **{f"EYX_z{z}": tuple(f"EYX_z{z}_{p}" for p in STATIONS["x"]) for z in STATIONS["z"]},
         **{f"{a.upper()}_six": tuple(n for c in COMPONENTS if c[2] == a.upper() for n in _profile(c)) for a in AXES},

@@ -87,12 +87,6 @@ def laser(axis: str, position: float) -> VirtualProbe:
     return VirtualProbe(f"positioning of {axis.upper()} at {position:g} mm, laser", reads, geometry)
 
 
-def pitch(position: int) -> VirtualProbe:
-    """Return a laser that measures the pitch of Y at one of its stations [mm]."""
-    words = f"pitch of Y at {position} mm: rotation of the headstock about X, laser"
-    return VirtualProbe(words, {f"ay@{position}": 1.0, "ay@0": -1.0} if position else {}, unit="urad")
-
-
 def weigh_tool_point(axis: str, point: Mapping[str, float]) -> dict[str, float]:
     """Return the weights for the tool-point deviation along an axis, for any axis positions.
 

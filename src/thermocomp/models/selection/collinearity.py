@@ -1,4 +1,4 @@
-"""Collinearity of variables, and correlation of each with the error (Hwang, section 3.2.3)."""
+"""Collinearity of variables, their correlation with the error (Hwang, section 3.2.3), and screening by both (Chen)."""
 
 from dataclasses import dataclass
 
@@ -122,3 +122,68 @@ def contributions(X: FloatArray, y: FloatArray) -> FloatArray:
     if moves[-1]:
         found[moves[:-1]] = correlation(both[:, moves])[-1, :-1]
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """Result of `screen`.
+
+    Parameters
+    ----------
+    relevance : ndarray of shape (n_columns, n_errors)
+        Correlation of each column with each error; nan if one of them is constant.
+    likeness : ndarray of shape (n_columns, n_columns)
+        Correlations of the columns with each other; 0 for a constant column, except with itself.
+    kept : tuple of int
+        Columns in the order in which they were kept.
+    """
+
+    relevance: FloatArray
+    likeness: FloatArray
+    kept: tuple[int, ...]
+
+    @property
+    def strongest(self) -> tuple[int, ...]:
+        """Columns by their largest correlation with an error, in descending order of its magnitude."""
+        largest = np.abs(np.nan_to_num(self.relevance)).max(axis=1)
+        return tuple(np.argsort(-largest, kind="stable").tolist())
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Columns kept, in this order, then the others by their correlation with the errors."""
+        return (*self.kept, *(j for j in self.strongest if j not in self.kept))
+
+    def nearest(self, column: int) -> int | None:
+        """Return the column most correlated with a column, among those kept (before it); None if there are none."""
+        before = self.kept[: self.kept.index(column)] if column in self.kept else self.kept
+        return max(before, key=lambda i: abs(float(self.likeness[i, column])), default=None)
+
+
+def screen(X: FloatArray, Y: FloatArray, number: int) -> Screening:
+    """Screen variables by their correlation with the errors and with each other (Chen, section 3.1; C-11).
+
+    Chen's rule is not known: the variables left "had strong correlations" with the errors, and "highly intercorrelated"
+    ones are said to cause round-off. Here each step keeps the variable with the largest r^2 (1 - s^2), where r is its
+    strongest correlation with any of the errors, and s that with any variable kept before: the share of an error that
+    it explains, times the share of its variance that is new. Of equal ones, the first is kept.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_columns)
+    Y : ndarray of shape (n_rows, n_errors)
+    number : int
+        Number of variables to keep. Fewer are kept if all others are constant, uncorrelated with every error, or copies
+        of those kept.
+    """
+    relevance = np.column_stack([contributions(X, y) for y in Y.T])
+    moves = np.flatnonzero(find_varying(X))
+    likeness = np.eye(X.shape[1])
+    if moves.size:
+        likeness[np.ix_(moves, moves)] = correlation(X[:, moves])
+    explained = np.nan_to_num(relevance**2).max(axis=1)
+    new = np.ones(X.shape[1])
+    kept: list[int] = []
+    while len(kept) < number and (gain := explained * new).max() > 0:
+        kept.append(int(np.argmax(gain)))
+        new = np.minimum(new, 1 - likeness[kept[-1]] ** 2)
+    return Screening(relevance, likeness, tuple(kept))

@@ -182,12 +182,6 @@ claims = Claims[LearnedDrift](__name__)
 
 
 @claims.facts
-def _correlated(found: LearnedDrift) -> Facts:
-    weakest, *_, strongest = sorted(((max(r), t) for t, r in screening(found).items()), key=lambda best: best[0])
-    return {"weakest": weakest, "strongest": strongest}
-
-
-@claims.facts
 def _halved(found: LearnedDrift) -> Facts:
     shares, paper = ({t: terms[t] / found.candidates[t] for t in DRIFTS} for terms in (found.terms, TERMS))
     many = [t for t in DRIFTS if shares[t] > 0.5]
@@ -248,21 +242,11 @@ def _starts(found: LearnedDrift) -> Facts:
     return {"extremes": [(t, found.mae_net(t).min(), found.mae_net(t).max()) for t in DRIFTS]}
 
 
-def screening(found: LearnedDrift) -> dict[str, tuple[float, ...]]:
-    """Return the absolute correlation of each of the nine temperatures with x, y, z (C-11)."""
-    change = found.samples.change()
-    return {
-        name: tuple(abs(float(np.corrcoef(change[:, j], y)[0, 1])) for y in found.samples.deviations.T)
-        for j, name in enumerate(TEMPERATURES)
-    }
-
-
 # -- tables and figures -----------------------------------------------------------------------------------------------
 
 
 def tables(found: LearnedDrift) -> list[StudyTable]:
-    """Return Tables 1 and 2, the fits, Eq. 5 next to our coefficients, the training logs of Fig. 2 and the sweep."""
-    sensors = [(name, setup.SENSORS.get(name, "mean of T6 to T9"), r) for name, r in screening(found).items()]
+    """Return Table 2, the fits, Eq. 5 next to our coefficients, the training logs of Fig. 2 and the sweep."""
     printed = {"x": (f" ({R2_X})", f" ({SEE_X:.1f})")}
     fits = []
     for t, regression in found.regressions.items():
@@ -272,7 +256,6 @@ def tables(found: LearnedDrift) -> list[StudyTable]:
     x, y = found.regressions["x"], found.regressions["y"]
     nets = {**found.others, "9-20-3": found.nets}
     return [
-        setup.exhibits.table("sensors", sensors),
         setup.exhibits.table("fits", fits),
         setup.exhibits.table("eq5", beside(dict(zip(x.terms_, x.coef_.tolist(), strict=True)), EQ5)),
         setup.exhibits.table("log_x", [(s, s.action.upper()) for s in x.log_]),

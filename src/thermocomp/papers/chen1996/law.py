@@ -131,37 +131,39 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Recovery of the known law over many draws of the noise.
+    """Recovery of a known law over many draws of the noise.
 
     Parameters
     ----------
+    law : mapping of str to float
+        True coefficients by term name.
     found : sequence of mapping of str to float
-        Coefficients by term name, one mapping per draw [um/m per degC, degC2].
+        Coefficients that were found, one mapping per draw, in the same units.
     """
 
-    design: Design
+    law: Mapping[str, float]
     found: Sequence[Mapping[str, float]]
 
     @property
     def whole(self) -> float:
-        """Share of the noise draws in which exactly the terms of Eq. 8 are selected."""
-        return float(np.mean([f.keys() == EQ8.keys() for f in self.found]))
+        """Share of the noise draws in which exactly the terms of the law are selected."""
+        return float(np.mean([f.keys() == self.law.keys() for f in self.found]))
 
     @property
     def missing(self) -> float:
-        """Share of the noise draws in which a term of Eq. 8 is not selected."""
-        return float(np.mean([bool(EQ8.keys() - f.keys()) for f in self.found]))
+        """Share of the noise draws in which a term of the law is not selected."""
+        return float(np.mean([bool(self.law.keys() - f.keys()) for f in self.found]))
 
     @property
     def wrong(self) -> float:
-        """Share of the noise draws in which a term is selected that is not in Eq. 8."""
-        return float(np.mean([bool(f.keys() - EQ8.keys()) for f in self.found]))
+        """Share of the noise draws in which a term is selected that is not in the law."""
+        return float(np.mean([bool(f.keys() - self.law.keys()) for f in self.found]))
 
     @property
     def coefficients(self) -> FloatArray:
-        """Coefficients of Eq. 8 in the draws with exactly its terms, (n_whole, 4); one row of nan if there are none."""
-        rows = [[f[t] for t in EQ8] for f in self.found if f.keys() == EQ8.keys()]
-        return np.array(rows or [[np.nan] * len(EQ8)])
+        """Coefficients in the draws with exactly the terms of the law, (n_whole, n_terms); else one row of nan."""
+        rows = [[f[t] for t in self.law] for f in self.found if f.keys() == self.law.keys()]
+        return np.array(rows or [[np.nan] * len(self.law)])
 
 
 def temperatures(experiment: str, seed: int) -> list[FloatArray]:
@@ -179,7 +181,7 @@ def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -
     """
     made = []
     for true in day:
-        errors = EQ6(POSITIONS) + 1e-3 * np.outer(slope(true - true[0]), POSITIONS)
+        errors = EQ6(POSITIONS) + 1e-3 * np.outer(evaluate(EQ8, true - true[0]), POSITIONS)
         errors = errors + design.laser * rng.standard_normal(errors.shape)
         read = true + design.sensor * rng.standard_normal(true.shape)
         n = len(true) // design.runs
@@ -188,20 +190,25 @@ def plant(day: Sequence[FloatArray], design: Design, rng: np.random.Generator) -
     return made
 
 
-def slope(change: FloatArray) -> FloatArray:
-    """Return the slope of Y according to Eq. 8 [um/m].
+def evaluate(law: Mapping[str, float], change: FloatArray) -> FloatArray:
+    """Return the value of a law such as Eq. 5 [um] or Eq. 8 [um/m].
 
     Parameters
     ----------
+    law : mapping of str to float
+        Coefficients by term name: products of temperatures and differences, such as ``T2*(T6-T7)``.
     change : ndarray of shape (n, 9)
         Changes of T1 to T9 [degC].
     """
     column = dict(zip(TEMPERATURES, change.T, strict=True))
-    k1 = np.zeros(len(change))
-    for term, factor in EQ8.items():
-        plus, _, minus = term.strip("()").partition("-")
-        k1 += factor * (column[plus] - (column[minus] if minus else 0.0))
-    return k1
+    total = np.zeros(len(change))
+    for term, factor in law.items():
+        product = np.full(len(change), factor)
+        for variable in term.split("*"):
+            plus, _, minus = variable.strip("()").partition("-")
+            product *= column[plus] - (column[minus] if minus else 0.0)
+        total += product
+    return total
 
 
 def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, seed: int) -> Recovery:
@@ -213,7 +220,7 @@ def recover(design: Design, days: Sequence[Sequence[FloatArray]], n_draws: int, 
         change, k1 = (np.concatenate(v) for v in zip(*(m.counted(design) for m in measured), strict=True))
         regression: SecondOrderRegression = design.method.fit(pd.DataFrame(change, columns=list(TEMPERATURES)), k1)
         found.append(dict(zip(regression.terms_, regression.coef_.tolist(), strict=True)))
-    return Recovery(design, found)
+    return Recovery(EQ8, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +267,7 @@ def seek(seed: int) -> Law:
     ends = [net.predict(change.assign(T1=end)) for end in (change["T1"].min(), change["T1"].max())]
     (true,) = days["chen1996-slope"][0]
     other = Measured(true - true[0], np.zeros((len(true), len(POSITIONS)))).profiles("other").states.table
-    planted = slope(other[list(TEMPERATURES)].to_numpy())
+    planted = evaluate(EQ8, other[list(TEMPERATURES)].to_numpy())
     missed = {
         "law": planted,
         "MRA": planted - fit.trained[0].estimator.predict(other[list(TEMPERATURES)]),

@@ -1,10 +1,10 @@
-"""Chen, Yuan, Ni 1996: drifts of the spindle, positioning of Y, new observations, the whole work volume, and a part."""
+"""Chen, Yuan, Ni 1996: screening, drifts of the spindle, positioning of Y, new observations, volume, and a part."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from thermocomp.papers.chen1996 import anywhere, drift, part, slope, unseen, volume
+from thermocomp.papers.chen1996 import anywhere, drift, equation5, part, screening, slope, unseen, volume
 from thermocomp.papers.chen1996.setup import exhibits
 from thermocomp.papers.study import Figure, Part, Progress, Study
 
@@ -16,6 +16,7 @@ def run(seed: int, progress: Progress) -> Study:
     new, first_laser, second_laser, first_week, second_week = ((seed + 1) * 1000 + k for k in range(5))
     progress(0.0, "five tests, regressions and nets")
     learned = drift.learn(seed, lambda share: progress(0.5 * share, "nets"))
+    screened, imposed = screening.learn(seed, new, learned), equation5.seek(learned, seed)
     progress(0.5, "slopes of Y")
     slopes = slope.learn(first_laser, second_laser)
     progress(0.6, "new observations, noise, a lost sensor")
@@ -28,12 +29,14 @@ def run(seed: int, progress: Progress) -> Study:
     study = Study.of(
         "chen1996",
         TITLE,
+        Part(screening.claims(screened), screening.tables(screened), (), screening.numbers(screened)),
         Part(
             drift.claims(learned),
             drift.tables(learned),
             drift.figures(learned),
             exhibits.numbers("drift", learned),
         ),
+        Part(equation5.claims(imposed), equation5.tables(imposed), (), equation5.numbers(imposed)),
         Part(slope.judge(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
         Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),
         Part(anywhere.claims(volumes), anywhere.tables(volumes), anywhere.figures(volumes), anywhere.numbers(volumes)),

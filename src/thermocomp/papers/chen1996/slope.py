@@ -37,8 +37,8 @@ class LearnedPositioning:
     ----------
     learned, other : Profiles
         EYY: the 51 training sets, and the same test on another day.
-    pitch : Profiles
-        EAY, measured together with `learned`.
+    yaw : Profiles
+        ECY, measured together with `learned`.
     fits : mapping of str to PositionFit
         Fits to `learned` by method; for the nets the one with the median error after training.
     nets : sequence of PositionFit
@@ -51,7 +51,7 @@ class LearnedPositioning:
 
     learned: Profiles
     other: Profiles
-    pitch: Profiles
+    yaw: Profiles
     fits: Mapping[str, PositionFit]
     nets: Sequence[PositionFit]
     linear: PositionFit
@@ -126,7 +126,7 @@ def learn(seed: int, other_seed: int) -> LearnedPositioning:
     return LearnedPositioning(
         learned=learned,
         other=other,
-        pitch=from_recording(first, "EAY"),
+        yaw=from_recording(first, "ECY"),
         fits=fits,
         nets=nets,
         linear=linear,
@@ -248,13 +248,13 @@ def figures(found: LearnedPositioning) -> list[Figure]:
     hours = learned.states.time / 3600.0
     peak = int(np.abs(k1).argmax())
     states = [*np.linspace(0, peak, 5).round().astype(int).tolist(), len(hours) - 1]
-    pitch, errors = (
+    yaw, errors = (
         [PlotCurve(f"after {hours[k]:.1f} h", day.position, day.values[k]) for k in states]
-        for day in (found.pitch, learned)
+        for day in (found.yaw, learned)
     )
     mra, net = ({"measured": k1, m: found.predicted(found.fits[m], learned)} for m in (MRA, NET))
     return [
-        exhibits.figure("chen1996-fig1", pitch),
+        exhibits.figure("chen1996-fig1", yaw, range=np.ptp(found.yaw.slopes(offset=True).factors[:, 1])),
         exhibits.figure("chen1996-fig6", errors),
         exhibits.figure("chen1996-fig7", (hours, mra)),
         exhibits.figure("chen1996-fig13", (hours, net)),
