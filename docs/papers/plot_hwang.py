@@ -4,9 +4,9 @@ Hwang, Lee, Yang: grouping and selection of variables
 
 *Optimal Variable Selection in a Thermal Error Model for Real Time Error Compensation*. A machining centre is stopped,
 or runs slowly or fast, in random order, for six hours; every 30 min 14 temperatures and the drift of Z are recorded.
-Correlated temperatures form a group, one temperature of each group enters the model, and the model is linear: according to the
-paper it is as accurate as an engineer's choice, quicker to find, better conditioned, and less sensitive to sensor
-errors.
+Correlated temperatures form a group, one temperature of each group enters the model, and the model is linear: according
+to the paper it is as accurate as an engineer's choice, quicker to find, better conditioned, and less sensitive to
+sensor errors.
 
 This page does the same on the virtual machining centre; ``thermocomp papers hwang`` prints the same. The paper's
 results are based on about 32 rows; ours on 39, from three such tests of a different machine. So numbers differ; the

@@ -102,8 +102,8 @@ def test_both_searches_are_counted_and_timed(computed: Computed, study: Study) -
 def test_time_is_saved_if_the_search_is_shorter(seconds: float, holds: bool) -> None:
     # H-19
     searches = {
-        hwang_setup.OPTIMAL: hwang_setup.Search((255, 4), seconds),
-        hwang_setup.SINGLE: hwang_setup.Search((8191, 1), 0.008),
+        hwang_setup.OPTIMAL: hwang_setup.TimedSearch((255, 4), seconds),
+        hwang_setup.SINGLE: hwang_setup.TimedSearch((8191, 1), 0.008),
     }
     found: Any = SimpleNamespace(searches=searches)
     (said,) = hwang.claims.judged("quicker", found)

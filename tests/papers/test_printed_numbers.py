@@ -135,7 +135,7 @@ COMPARED = {
     "chen1996.setup": ("SENSORS", "TEMPERATURES", "DIFFERENCES", "EQ6"),
     "wessel2004.sets": ("PAPERS_OWN",),
     "hwang.setup": ("NAMES", "TABLE_3", "PAPERS_ROWS"),
-    "precompensation.setup": ("POSITIONS",),
+    "precompensation.setup": ("POSITIONS", "INTERPOLATIONS"),
 }
 #: choices of our own, and names of the virtual machine: no paper prints them
 OURS = {
@@ -152,7 +152,7 @@ OURS = {
     "hwang.setup": ("NOISES", "LAWS", "RUNS", "NEW", "TIMINGS", "OURS"),
     "precompensation.cutting": ("HOUR", "BEFORE", "BEFORE_SPEED", "ROOM", "OFTEN", "CASES", "TRIED", "HOUSE"),
     "precompensation.redo": ("BEYOND",),
-    "precompensation.setup": ("GREATEST", "INTERVALS", "CUTS", "MILLING"),
+    "precompensation.setup": ("BETWEEN", "GREATEST", "INTERVALS", "CUTS", "MILLING"),
     "stepwise2017.setup": ("METHODS", "SLICES", "NOISE_SHARE", "THINNED"),
 }
 #: everything of the program that is milled, and of the way it is revised, is our own

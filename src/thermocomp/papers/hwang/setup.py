@@ -1,11 +1,11 @@
 """Computation of the study of Hwang, Lee and Yang; `thermocomp.papers.hwang.redo` presents it.
 
 Tests of six hours in three states in random order, 14 sensors, drift Z, a row every 30 min (H-09); several are fitted
-together, because one has too few rows (E-H7). T14 (bed) is the reference: each variable is ``T_i - T14``, with absolute temperatures, not relative to the start of the test (H-08). The threshold of the paper
-is unknown (E-H1): the one used gives as many groups as its Table 1, or the nearest number; the sweep includes all
-others. The performance on new tests, with other orders of the states and other weather, is reported in addition.
-
-Each test has the seed of the study plus its number: first those for training, then the new ones.
+together, because one has too few rows (E-H7). T14 (bed) is the reference: each variable is ``T_i - T14``, with absolute
+temperatures, not relative to the start of the test (H-08). The threshold of the paper is unknown (E-H1): the one used
+gives as many groups as its Table 1, or the nearest number; the sweep includes all others. The performance on new tests,
+with other orders of the states and other weather, is reported in addition. Each test has the seed of the study plus its
+number: first those for training, then the new ones.
 """
 
 import time
@@ -119,7 +119,7 @@ def agreement(groups: Groups) -> float:
 
 
 @dataclass(frozen=True)
-class Search:
+class TimedSearch:
     """Search for the best model (H-19).
 
     Parameters
@@ -166,7 +166,7 @@ class Computed:
     swept: list[tuple[Interval, CorrelationGrouping]]
     fits: dict[str, PaperFit]
     shaken: dict[tuple[str, float], dict[str, Sensitivity]]
-    searches: dict[str, Search]
+    searches: dict[str, TimedSearch]
     ours: dict[str, FloatArray]
 
     @property
@@ -248,7 +248,7 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
     return PaperFit(model, float(g.r_squared_), float(g.standard_error_))
 
 
-def _search(samples: Samples, threshold: float) -> Search:
+def _search(samples: Samples, threshold: float) -> TimedSearch:
     """Return the numbers of models and the time of a search; the only difference between searches is the threshold."""
     change = samples.change()
     regressors = change[:, :-1] - change[:, -1:]
@@ -259,7 +259,7 @@ def _search(samples: Samples, threshold: float) -> Search:
         begin = time.perf_counter()
         found = choose(tri, group(close, threshold))
         seconds.append(time.perf_counter() - begin)
-    return Search((found.subsets.count, found.members.count), min(seconds))
+    return TimedSearch((found.subsets.count, found.members.count), min(seconds))
 
 
 def _ours(tests: Sequence[Recording]) -> dict[str, FloatArray]:
