@@ -27,6 +27,7 @@ extensions = [
     "erratum_table",
     "method_table",
     "requirement_table",
+    "verdict_table",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

@@ -1,7 +1,9 @@
 """Hwang's study: its procedure on the virtual machine, and that its claims can fail."""
 
+import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from thermocomp.models.selection.grouping import Interval
+from thermocomp.models.numerics.leastsquares import Triangle
+from thermocomp.models.selection import grouping
+from thermocomp.models.selection.grouping import Grouped, Groups, Interval
 from thermocomp.papers.common import predict_deviation
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.hwang import setup as hwang_setup
@@ -86,26 +90,21 @@ def test_rows_are_those_of_whole_tests_every_half_hour(computed: Computed) -> No
 
 def test_both_searches_are_counted_and_timed(computed: Computed, study: Study) -> None:
     """H-19: 8191 models without grouping, 255 and those of the members with it; both times are printed."""
-    grouped, single = (computed.searches[name] for name in (hwang_setup.OPTIMAL, hwang_setup.SINGLE))
-    assert single.models == (8191, 1)
-    assert grouped.models == computed.grouped.searched_
-    assert grouped.models[0] == 2 ** len(computed.grouped.groups_) - 1
-    said = claim(study, "H-19")
-    printed = re.match(r"(\d+) models instead of 8191: (\d+\.\d) ms instead of (\d+\.\d) ms, \d", said.ours)
+    assert computed.single.searched_ == (8191, 1)
+    assert computed.grouped.searched_[0] == 2 ** len(computed.grouped.groups_) - 1
+    said = claim(study, "H-19").ours
+    printed = re.match(r"(\d+) models instead of 8191: (\d+\.\d) ms instead of (\d+\.\d) ms, \d", said)
     assert printed is not None
-    assert int(printed[1]) == study.numbers["models_tried"]
-    times = [1e3 * s.seconds for s in (grouped, single)]
+    assert int(printed[1]) == sum(computed.grouped.searched_)
+    times = [1e3 * computed.seconds[name] for name in (hwang_setup.OPTIMAL, hwang_setup.SINGLE)]
     assert [float(printed[2]), float(printed[3])] == pytest.approx(times, abs=0.051)
 
 
 @pytest.mark.parametrize(("seconds", "holds"), [(0.001, True), (0.009, False)])
 def test_time_is_saved_if_the_search_is_shorter(seconds: float, holds: bool) -> None:
     # H-19
-    searches = {
-        hwang_setup.OPTIMAL: hwang_setup.TimedSearch((255, 4), seconds),
-        hwang_setup.SINGLE: hwang_setup.TimedSearch((8191, 1), 0.008),
-    }
-    found: Any = SimpleNamespace(searches=searches)
+    searched = {name: SimpleNamespace(searched_=n) for name, n in (("grouped", (255, 4)), ("single", (8191, 1)))}
+    found: Any = SimpleNamespace(seconds={hwang_setup.OPTIMAL: seconds, hwang_setup.SINGLE: 0.008}, **searched)
     (said,) = hwang.claims.judged("quicker", found)
     assert said.holds is holds
     assert said.ours.startswith("259 models instead of 8191")
@@ -130,8 +129,33 @@ def test_the_verdicts_are_those_of_the_numbers(study: Study) -> None:
     assert claim(study, "H-15").holds is (n["variables_without_grouping"] > n["variables"])
 
 
-def test_a_seed_is_a_study(study: Study) -> None:
-    assert hwang.run(0, tell_nobody).numbers == study.numbers
+@pytest.fixture
+def searched(monkeypatch: pytest.MonkeyPatch) -> list[Grouped]:
+    """The searches that were timed, by a clock that needs 1 ms for each of their models."""
+    done: list[Grouped] = []
+
+    def choose(tri: Triangle, groups: Groups) -> Grouped:
+        done.append(grouping.choose(tri, groups))
+        return done[-1]
+
+    def perf_counter() -> float:
+        return sum(s.subsets.count + s.members.count for s in done) / 1000
+
+    monkeypatch.setattr(hwang_setup, "choose", choose)
+    monkeypatch.setattr(hwang_setup, "time", SimpleNamespace(perf_counter=perf_counter))
+    return done
+
+
+def test_a_seed_is_a_study(computed: Computed, study: Study, searched: list[Grouped]) -> None:
+    """And H-19: both searches are done by the same routine, and find the models of the study."""
+    again = hwang.run(0, tell_nobody)
+    assert again.numbers == study.numbers
+    models = int(again.numbers["models_tried"])
+    assert claim(again, "H-19").ours.startswith(f"{models} models instead of 8191: {models}.0 ms instead of 8192.0 ms")
+    both = (computed.grouped, computed.single)
+    assert {s.selected: (s.subsets.count, s.members.count) for s in searched} == {
+        m.selected_: m.searched_ for m in both
+    }
     assert hwang.run(1, tell_nobody).numbers != study.numbers
 
 
@@ -151,6 +175,14 @@ def test_a_drift_of_squares_refutes_the_linear_model(monkeypatch: pytest.MonkeyP
     assert refuted.holds is False
     assert "times the error of the engineering judgement model" in refuted.finding
     assert study.numbers["r_squared_judgement"] > 0.999
+
+
+def test_the_documentation_shows_this_study(study: Study) -> None:
+    """The first of its runs: what is judged, and how; `make verdicts STUDIES=hwang` makes it again."""
+    content = json.loads((Path(__file__).parents[2] / "docs" / "verdicts.json").read_text(encoding="utf-8"))
+    kept = content["studies"]["hwang"]["claims"]
+    told = [([*c.ids], c.text, c.holds) for c in study.claims if "H-19" not in c.ids]  # that one is about times
+    assert [(c["ids"], c["claim"], c["holds"]) for c in kept if "H-19" not in c["ids"]] == told
 
 
 def test_agreement_with_table_1() -> None:

@@ -118,22 +118,6 @@ def agreement(groups: Groups) -> float:
     return sum((ours[a] == ours[b]) == (paper[a] == paper[b]) for a, b in pairs) / len(pairs)
 
 
-@dataclass(frozen=True)
-class TimedSearch:
-    """Search for the best model (H-19).
-
-    Parameters
-    ----------
-    models : tuple of int
-        Numbers of models that were tried.
-    seconds : float
-        Duration of the search in prepared data, shortest of `TIMINGS` [s].
-    """
-
-    models: tuple[int, ...]
-    seconds: float
-
-
 @dataclass(frozen=True, eq=False)
 class Computed:
     """All results of the study of Hwang.
@@ -152,8 +136,8 @@ class Computed:
         The three models, by name.
     shaken : dict of (str, float) to dict of str to Sensitivity
         R2 under random sensor error, by distribution and magnitude [degC].
-    searches : dict of str to Search
-        Searches with and without grouping, by model.
+    seconds : dict of str to float
+        Times of the searches with and without grouping, by model [s] (H-19).
     ours : dict of str to ndarray
         Residuals of `OURS` in the new tests [um], which the paper does not have.
     """
@@ -166,7 +150,7 @@ class Computed:
     swept: list[tuple[Interval, CorrelationGrouping]]
     fits: dict[str, PaperFit]
     shaken: dict[tuple[str, float], dict[str, Sensitivity]]
-    searches: dict[str, TimedSearch]
+    seconds: dict[str, float]
     ours: dict[str, FloatArray]
 
     @property
@@ -233,7 +217,7 @@ def compute(seed: int, progress: Progress) -> Computed:
         swept=swept,
         fits=fits,
         shaken=shaken,
-        searches={OPTIMAL: _search(fit, interval.low), SINGLE: _search(fit, 1.0)},
+        seconds={OPTIMAL: _seconds(fit, interval.low), SINGLE: _seconds(fit, 1.0)},
         ours=_ours(tests),
     )
 
@@ -248,18 +232,18 @@ def _fit_of(g: CorrelationGrouping, samples: Samples) -> PaperFit:
     return PaperFit(model, float(g.r_squared_), float(g.standard_error_))
 
 
-def _search(samples: Samples, threshold: float) -> TimedSearch:
-    """Return the numbers of models and the time of a search; the only difference between searches is the threshold."""
+def _seconds(samples: Samples, threshold: float) -> float:
+    """Return the shortest time of a search in prepared data [s]; searches differ by their threshold only (H-19)."""
     change = samples.change()
     regressors = change[:, :-1] - change[:, -1:]
     tri = triangle(join_columns(regressors, samples.deviations[:, 0]), intercept=True)
     close = correlation(change[:, :-1])
-    seconds = []
+    found = []
     for _ in range(TIMINGS):
         begin = time.perf_counter()
-        found = choose(tri, group(close, threshold))
-        seconds.append(time.perf_counter() - begin)
-    return TimedSearch((found.subsets.count, found.members.count), min(seconds))
+        choose(tri, group(close, threshold))
+        found.append(time.perf_counter() - begin)
+    return min(found)
 
 
 def _ours(tests: Sequence[Recording]) -> dict[str, FloatArray]:
