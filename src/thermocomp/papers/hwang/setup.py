@@ -252,7 +252,7 @@ def _ours(tests: Sequence[Recording]) -> dict[str, FloatArray]:
     often = [common.stacked(r, [TARGET], inputs) for r in (tests[:RUNS], tests[RUNS:])]
     rows = {"30 min": [_thinned(s) for s in often], "10 min": often}
     return {
-        f"{method}, rows every {every} (not in the paper)": common.residual(common.trained(method, learn), new)
+        f"{method}, every {every}": common.residual(common.trained(method, learn), new)
         for method in OURS
         for every, (learn, new) in rows.items()
     }

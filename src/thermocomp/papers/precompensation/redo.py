@@ -53,6 +53,11 @@ def _orders(c: Computed) -> Facts:
 
 
 @claims.facts
+def _net(c: Computed) -> Facts:
+    return {"others": [(name, c.errors[name].rms) for name in c.models if name not in (NET, LEAST, CHOSEN)]}
+
+
+@claims.facts
 def _described(c: Computed) -> Facts:
     z, learned, left, shares = c.judge.deviations, c.learn.deviations, c.left[NET], c.shares(NET)
     beyond = (z < learned.min(axis=0)) | (z > learned.max(axis=0))
