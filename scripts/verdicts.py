@@ -22,7 +22,8 @@ def entries(study: str) -> list[dict[str, Any]]:
 
 def digest(study: str) -> str:
     """Return a digest of the sentences and criteria of a study's claims."""
-    kept = [[entry.get(k) for k in ("text", "paper", "holds", "softer", "whole", "each")] for entry in entries(study)]
+    keys = ("text", "paper", "holds", "softer", "whole", "premise", "each")
+    kept = [[entry.get(key) for key in keys] for entry in entries(study)]
     return hashlib.sha256(json.dumps(kept).encode()).hexdigest()[:16]
 
 
@@ -32,11 +33,8 @@ def main(names: list[str]) -> None:
     made = json.loads(subprocess.run(line, stdout=subprocess.PIPE, check=True).stdout)
     known = json.loads(FILE.read_text(encoding="utf-8"))["studies"] if names and FILE.exists() else {}
     for study in made.pop("studies"):
-        claims = [
-            {key: value for key, value in c.items() if value not in ("", [], False, None) or key == "holds"}
-            for c in study["claims"]
-        ]
-        known[study["name"]] = {"title": study["title"], "digest": digest(study["name"]), "claims": claims}
+        name = study["name"]
+        known[name] = {"title": study["title"], "digest": digest(name), "claims": study["claims"]}
     content = {"made by": "make verdicts", **made, "studies": known}
     FILE.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -28,6 +28,8 @@ from sphinx.util.docutils import SphinxDirective
 from thermocomp.papers.report.papers import count_verdicts, text
 from thermocomp.papers.study import Claim, Study
 
+#: headings of verdicts
+HEADINGS = {"yes": "hold in each run", "some": "in some runs", "no": "in none"}
 FILE = Path(__file__).parents[1] / "verdicts.json"
 
 
@@ -41,9 +43,8 @@ def read() -> dict[str, Study]:
 
 
 def _claim(found: dict[str, Any]) -> Claim:
-    given = {"paper": "", "ours": ""} | found
-    ids, again = tuple(given.pop("ids")), tuple(given.pop("again", ()))
-    return Claim(ids=ids, text=given.pop("claim"), again=again, **given)
+    named = {"text" if key == "claim" else key: value for key, value in found.items()}
+    return Claim(**named | {key: tuple(found[key]) for key in ("ids", "again")})
 
 
 def headlines(line: str, studies: dict[str, Study]) -> list[Claim]:
@@ -55,7 +56,7 @@ def headlines(line: str, studies: dict[str, Study]) -> list[Claim]:
         There is none.
     """
     name, key, *printed = line.split(maxsplit=2)
-    found = [c for c in studies[name].claims if key in c.ids and c.holds is not None]
+    found = [c for c in studies[name].claims if key in c.ids and c.verdict != "-"]
     found = [c for c in found if all(part in c.paper for part in printed)]
     if not found:
         raise ValueError(f"no claim of {line}")
@@ -65,35 +66,36 @@ def headlines(line: str, studies: dict[str, Study]) -> list[Claim]:
 class VerdictTable(SphinxDirective):
     """See the module."""
 
-    header: ClassVar[tuple[str, ...]] = ("study", "hold in each run", "in part", "in some runs", "in none")
-    widths = "28 18 18 18 18"
+    widths = "auto"
 
     def run(self) -> list[nodes.Node]:
         """Return a table."""
         self.env.note_dependency(str(FILE))
         lines = [".. list-table::", "   :header-rows: 1", f"   :widths: {self.widths}", ""]
-        for row in (self.header, *self.rows(read())):
-            lines += [f"   {'-' if k else '* -'} {cell}".replace("   -", "     -") for k, cell in enumerate(row)]
+        for row in self.rows(read()):
+            lines += [f"   {' ' if k else '*'} - {cell}" for k, cell in enumerate(row)]
         place = nodes.container()
         self.state.nested_parse(StringList(lines, source=str(FILE)), self.content_offset, place)
         return place.children
 
     def rows(self, studies: dict[str, Study]) -> Iterator[tuple[str, ...]]:
-        """Yield the cells of each row."""
-        for name, study in studies.items():
-            n = count_verdicts(study)
-            yield f"``{name}``", *(str(n[word]) for word in ("yes", "in part", "some", "no"))
+        """Yield the cells of each row, first the header."""
+        counts = {name: count_verdicts(study) for name, study in studies.items()}
+        words = [word for word in next(iter(counts.values())) if word != "-"]
+        yield "study", *(HEADINGS.get(word, word) for word in words)
+        for name, n in counts.items():
+            yield f"``{name}``", *(str(n[word]) for word in words)
 
 
 class HeadlineTable(VerdictTable):
     """See the module."""
 
     has_content = True
-    header = ("study", "claim", "paper", "here", "holds", "why")
     widths = "10 25 12 18 7 28"
 
     def rows(self, studies: dict[str, Study]) -> Iterator[tuple[str, ...]]:
-        """Yield the cells of each row."""
+        """Yield the cells of each row, first the header."""
+        yield "study", "claim", "paper", "here", "holds", "why"
         for line in self.content:
             for c in headlines(line, studies):
                 cells = (c.text, c.paper, c.ours, c.verdict, c.finding)

@@ -81,7 +81,7 @@ def test_one_study_is_made_again_and_the_others_are_kept(tmp_path: Path, monkeyp
     found = json.loads((tmp_path / "verdicts.json").read_text(encoding="utf-8"))
     assert asked[0][2:5] == ["thermocomp.cli.app", "papers", "hwang"]
     assert [*found["studies"]] == [*STUDIES]
-    assert found["studies"]["hwang"]["claims"] == [{"ids": ["H-16"], "claim": "It", "ours": "1", "holds": None}]
+    assert found["studies"]["hwang"] == {"title": "New", "digest": script.digest("hwang"), "claims": [claim]}
     assert all(found["studies"][s] == KEPT["studies"][s] for s in STUDIES if s != "hwang")
 
 
@@ -96,7 +96,9 @@ MADE = {"made": Study("made", "Made", CLAIMS, tables=(), figures=(), numbers={})
 
 
 def test_verdicts_are_counted() -> None:
-    assert [*page.VerdictTable.rows(None, MADE)] == [("``made``", "1", "1", "1", "1")]
+    header, row = page.VerdictTable.rows(None, MADE)
+    assert header[:5] == ("study", "hold in each run", "in part", "in none", "in some runs")
+    assert row[:5] == ("``made``", "1", "1", "1", "1")
 
 
 def test_headlines_are_claims_with_a_verdict() -> None:
@@ -104,7 +106,8 @@ def test_headlines_are_claims_with_a_verdict() -> None:
     assert said == [("made W-08 MLR 5.7", ["At rest"]), ("made W-08", ["At rest", "Locally", "Range"])]
     table = SimpleNamespace(content=["made W-08 in total"])
     assert [*page.HeadlineTable.rows(table, MADE)] == [
-        ("``made``", "Locally", "in total 5.7x", "3x", "in part", r"Half, not \*all\*.")
+        ("study", "claim", "paper", "here", "holds", "why"),
+        ("``made``", "Locally", "in total 5.7x", "3x", "in part", r"Half, not \*all\*."),
     ]
     with pytest.raises(ValueError, match=r"no claim of made W-08 5\.8"):
         page.headlines("made W-08 5.8", MADE)
