@@ -7,7 +7,7 @@ PYTEST ?=
 # each test worker uses one core: more threads of linear algebra would compete with the other worker
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-long check bench docs count clean
+.PHONY: help demo test test-long check bench docs verdicts count clean
 
 help:
 	@echo "make demo    the main workflow on the virtual machine: record, fit, evaluate on unseen cycles, report"
@@ -16,6 +16,7 @@ help:
 	@echo "make check   format, lint, types, architecture"
 	@echo "make bench   speed and accuracy compared with other packages"
 	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make verdicts    the papers' studies again, and their tables in the documentation"
 	@echo "make count   lines of code by package"
 	@echo "make clean   remove everything that the other targets created"
 
@@ -45,6 +46,9 @@ bench: $(BENCH)/.bench
 
 docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+verdicts: $(VENV)/.study
+	$(ONE_THREAD) $(BIN)/python scripts/verdicts.py $(STUDIES)
 
 count:
 	$(PYTHON) scripts/count.py

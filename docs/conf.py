@@ -26,6 +26,7 @@ extensions = [
     "component_table",
     "paper_tables",
     "method_table",
+    "verdict_table",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",

@@ -78,6 +78,7 @@ draw("precompensation-schedule")
 # is milled: how much deeper is the second? Eight such tests, each with different speeds.
 
 print(page.text(study, "P-07"))
+print(page.format_table(study.tables[4]))
 draw("precompensation-cut")
 assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_difference_um"]
 
@@ -86,9 +87,9 @@ assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_differenc
 # spindle speeds, four more faces. The program is revised as a file and read back as a controller reads it, and the
 # commanded positions are added to the true drift at that instant and position.
 
-print(page.format_table(study.tables[4]))
-print()
 print(page.format_table(study.tables[5]))
+print()
+print(page.format_table(study.tables[6]))
 draw("precompensation-surfaces")
 assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["program_depth_difference_cold_um"]
 
@@ -106,7 +107,7 @@ assert numbers["room_peak_to_peak_um"] > 1
 # The same with NC programs: if the initial state is wrong by half an hour, the revised program is worse than the
 # original; with the state at the end of the last job, it is better.
 
-print(page.format_table(study.tables[6]))
+print(page.format_table(study.tables[7]))
 draw("precompensation-programs")
 wrong, carried = (
     numbers[f"program_depth_difference_warm_{what}_revised_um"] for what in ("taken_for_cold", "carried_over")

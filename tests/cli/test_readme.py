@@ -81,15 +81,6 @@ def test_the_real_machine_prints_what_its_page_shows(
     assert_printed(page_blocks("real_machine.rst")[1], capsys.readouterr().out)
 
 
-@pytest.mark.long
-def test_the_study_prints_what_its_page_shows(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    assert run(["papers", "hwang"]) == 0
-    assert_printed(page_blocks("studies.rst")[0], capsys.readouterr().out)
-
-
 def test_the_readme_is_short_and_its_table_is_that_of_the_page() -> None:
     assert len(README.read_bytes()) <= 8_000
     assert set(blocks()[2]) <= set(page_blocks("real_machine.rst")[0])

@@ -47,7 +47,7 @@ def made(asked: str | Experiment, *, seed: int, room: float = 0.0) -> list[Recor
         walk -= walk[0]
         columns = {
             f"z_at_{p}_um": (1 - p / 2000) * z + walk + 0.05 * rng.normal(size=len(z))
-            for p in precompensation_setup.POSITIONS
+            for p in (*precompensation_setup.POSITIONS, *precompensation_setup.BETWEEN)
         }
         table = pd.DataFrame({**columns, "z_um": z + walk, "spindle_rpm": speed})
         channels = tuple(Channel(c, "displacement", "um") for c in [*columns, "z_um"])
@@ -167,6 +167,60 @@ def test_the_program_is_corrected_every_ten_minutes() -> None:
     time = np.arange(0.0, 31 * 60.0, 60.0)
     added = precompensation_setup.schedule_corrections(time, time[:, None] / 60)[:, 0]
     assert added.tolist() == [0.0] * 10 + [-10.0] * 10 + [-20.0] * 10 + [-30.0]
+
+
+@pytest.mark.parametrize(
+    ("function", "halfway"),
+    [
+        (precompensation_setup.NEAREST, [[0, 1, 8], [0, 1, 4]]),  # the lower of two equally near
+        (precompensation_setup.LINEAR, [[0.5, 4.5, 17.5], [0.5, 2.5, 6.5]]),
+        ("quadratic spline", [[None] * 3, [0.25, 2.25, 6.25]]),
+        # second derivatives 0, m, n, 0 with 4m + n = 6 (y0 - 2y1 + y2) and m + 4n = 6 (y1 - 2y2 + y3)
+        ("natural cubic spline", [[0.5 - 4.8 / 16, 4.5 - (4.8 + 16.8) / 16, 17.5 - 16.8 / 16], [0.35, 2.2, 6.35]]),
+        ("cubic polynomial", [[0.125, 3.375, 15.625], [0.25, 2.25, 6.25]]),
+    ],
+)
+def test_functions_that_interpolate_between_the_models(function: str, halfway: list[list[float | None]]) -> None:
+    """P-04, P-07: the cubes and the squares of 0, 1, 2, 3 at the models."""
+    at = np.array([[0.0, 1, 8, 27], [0, 1, 4, 9]])
+    positions = precompensation_setup.POSITIONS
+    found = precompensation_setup.INTERPOLATIONS[function](positions, at)
+    assert found(positions) == pytest.approx(at)
+    for row, expected in zip(found(precompensation_setup.BETWEEN), halfway, strict=True):
+        assert None in expected or row == pytest.approx(expected)
+
+
+def test_depths_halfway_between_the_models() -> None:
+    """P-07: on a machine whose drift is linear along Z a line is right, the nearest model is 100 mm off."""
+    learn = precompensation_setup.samples_of(made("precompensation", seed=0)[0])
+    estimator = ARX(inputs=("spindle_rpm",), time="routed", interval=60.0, k=1, m=0)
+    models = [
+        fit_and_freeze(estimator, learn, [c.name], dt=learn.dt(), cycle=learn.cycle)[c.name] for c in learn.targets
+    ]
+    (test,) = made("precompensation-cut", seed=5)
+    between = precompensation_setup.BETWEEN
+    nearest, line = (
+        precompensation_setup.cut(test, models, between, f)
+        for f in (precompensation_setup.NEAREST, precompensation_setup.LINEAR)
+    )
+    np.testing.assert_array_equal(nearest.without, line.without)
+    # the nearest model computes the drift of 100 mm lower, and the drift falls by 1/2000 per mm
+    off = np.array([100 / (2000 - p) for p in between])
+    assert np.abs(line.without).min() > 5
+    assert nearest.scheduled - line.scheduled == pytest.approx(off * (line.scheduled - line.without), rel=0.05)
+
+
+@pytest.mark.parametrize(("others", "holds"), [(5.0, True), (6.0, False)])
+def test_every_function_must_shrink_the_depth(others: float, holds: bool) -> None:
+    """P-07: 7 -> 2 um, so 20 -> 5.7 um."""
+    after = dict.fromkeys(precompensation_setup.INTERPOLATIONS, 3.0) | {"cubic polynomial": others}
+    found = SimpleNamespace(
+        between={f: [precompensation_setup.CuttingTest(np.full(3, 20.0), np.full(3, a))] for f, a in after.items()}
+    )
+    (claim,) = precompensation.claims.judged("between", found)  # type: ignore[arg-type]
+    assert claim.holds is holds
+    assert claim.ours.count(" um") == 1 + len(after)
+    assert f"at most {others - 3:.2f} um" in claim.finding
 
 
 def test_depth_difference_of_two_surfaces() -> None:

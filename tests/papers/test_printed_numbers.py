@@ -100,6 +100,7 @@ PRINTED = (
     Printed("hwang.setup.PAPERS_SHARE", 4 / 8, "H-11", "section 3.2.1 and Table 1: four of eight groups"),
     Printed("hwang.setup.JUDGEMENT", ("T6", "T7", "T13"), "H-13", "Table 2, right column, beside the squares"),
     Printed("hwang.setup.DRAWS", 100, "H-18", "section 3.2.4"),
+    Printed("hwang.setup.INTERVAL", 30 * 60, "H-09", "section 3.1: every 30 min [s]"),
     # Precompensation
     Printed("precompensation.setup.PAPERS_ORDERS", (1, 0), "P-02", "text: k = 1, m = 0"),
     Printed("precompensation.setup.INTERVAL", 10 * 60, "P-06", "text: every 10 min [s]"),
@@ -136,8 +137,8 @@ COMPARED = {
     "chen1996.equation5": ("IMPLIED",),
     "chen1996.setup": ("SENSORS", "TEMPERATURES", "DIFFERENCES", "EQ6"),
     "wessel2004.sets": ("PAPERS_OWN",),
-    "hwang.setup": ("NAMES", "TABLE_3"),
-    "precompensation.setup": ("POSITIONS",),
+    "hwang.setup": ("NAMES", "TABLE_3", "PAPERS_ROWS"),
+    "precompensation.setup": ("POSITIONS", "INTERPOLATIONS"),
 }
 #: choices of our own, and names of the virtual machine: no paper prints them
 OURS = {
@@ -153,10 +154,10 @@ OURS = {
     "wessel2004.sets": ("TOLERANCE", "TOLERANCE_LARGER"),
     "wessel2004.tools": ("STRETCHES", "EPISODE"),
     "wessel2004.trial": ("SWEEPS", "LOOP_STEPS"),
-    "hwang.setup": ("NOISES", "LAWS", "NEW"),
+    "hwang.setup": ("NOISES", "LAWS", "RUNS", "NEW", "TIMINGS", "OURS"),
     "precompensation.cutting": ("HOUR", "BEFORE", "BEFORE_SPEED", "ROOM", "OFTEN", "CASES", "TRIED", "HOUSE"),
     "precompensation.redo": ("BEYOND",),
-    "precompensation.setup": ("GREATEST", "INTERVALS", "CUTS", "MILLING"),
+    "precompensation.setup": ("BETWEEN", "GREATEST", "INTERVALS", "CUTS", "MILLING"),
     "stepwise2017.setup": ("METHODS", "SLICES", "NOISE_SHARE", "THINNED"),
 }
 #: everything of the program that is milled, and of the way it is revised, is our own
@@ -200,6 +201,7 @@ CLAIMED: dict[str, str] = {
     "hwang.redo.representatives": "7 8 2 1",  # H-11, section 3.2.1 (E-H4)
     "hwang.redo.fewer": "4 8",  # H-11, section 3.2.1 and Table 1
     "hwang.redo.models": f"{2**13 - 1} {2**8 - 1} {1 * 2 * 1 * 2}",  # H-07: groups 1, 4, 6, 7 of Table 1
+    "hwang.redo.quicker": f"{2**13 - 1} {2**8 - 1} {1 * 2 * 1 * 2}",  # H-19, section 3.2.3
     "hwang.redo.best": "7 8 2 6",  # H-11, section 3.2.1
     "hwang.redo.rows": "32",  # E-H7
     "hwang.redo.more": "7 4",  # H-15, Eq. 8 and Eq. 6
@@ -315,7 +317,13 @@ def test_table_3_of_hwang() -> None:
 def test_rows_of_hwang() -> None:
     """E-H7: if both models of Table 2 stem from the same n rows, then R2 and standard error give n."""
     squares = (1 - 0.9704) / (1 - 0.9697) / (6.39 / 6.72) ** 2  # (n - 5) / (n - 7), with 4 and 6 terms
-    assert (7 * squares - 5) / (squares - 1) == pytest.approx(32, abs=0.5)
+    assert (7 * squares - 5) / (squares - 1) == pytest.approx(hwang.PAPERS_ROWS, abs=0.5)
+    assert hwang.PAPERS_ROWS == 32
+    # with every printed number rounded
+    least, most = (
+        2 / (s - 1) + 7 for s in (0.02965 / 0.03025 / (6.385 / 6.725) ** 2, 0.02955 / 0.03035 / (6.395 / 6.715) ** 2)
+    )
+    assert (round(least), round(most)) == (30, 34)
 
 
 def test_positions_of_precompensation() -> None:

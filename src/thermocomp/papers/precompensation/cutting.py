@@ -46,7 +46,7 @@ CASES: Mapping[str, tuple[str, bool]] = {
 #: models tested in all cases, as the revision in the paper
 TRIED = (NET, LEAST)
 #: methods of thermocomp that can use the speed alone
-HOUSE = ("arx-free-run", "dynamic")
+HOUSE = ("arx-free-run", "dynamic", "averaged")
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ simulated twice: here by applying the schedule of corrections to recordings, and
 `thermocomp.papers.precompensation.cutting` with NC programs that are revised, read back and milled.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from thermocomp.models.selection.orders import Order
@@ -13,7 +15,7 @@ from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.common import errors_table, rms
 from thermocomp.papers.exhibits import Exhibits
 from thermocomp.papers.precompensation import cutting, cuttingtold, setup
-from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, NET, POSITIONS, Computed
+from thermocomp.papers.precompensation.setup import CHOSEN, CUTS, LEAST, LINEAR, NET, NONE, POSITIONS, Computed
 from thermocomp.papers.study import Figure, Part, Progress, Study, StudyTable
 
 TITLE = "Pre-compensation of thermal errors by revising the NC program"
@@ -28,8 +30,8 @@ BEYOND = 0.02
 def run(seed: int, progress: Progress) -> Study:
     """Reproduce the study of pre-compensation, and return its claims, tables and figures."""
     c = setup.compute(seed, lambda share, what: progress(share / 2, what))
-    models = c.models | cutting.house_models(c.learn)
-    m = cutting.compute(models, seed, lambda share, what: progress((1 + share) / 2, what))
+    c = replace(c, models=c.models | cutting.house_models(c.learn))
+    m = cutting.compute(c.models, seed, lambda share, what: progress((1 + share) / 2, what))
     recorded = Part(claims(c), _tables(c), _figures(c), exhibits.numbers("redo", c, first=c.by_fpe[0]))
     milled = Part(cuttingtold.claims(m), cuttingtold.tables(m), cuttingtold.figures(m), cuttingtold.numbers(m))
     return Study.of("precompensation", TITLE, recorded, milled)
@@ -48,6 +50,11 @@ def _orders(c: Computed) -> Facts:
         "worth": c.errors[CHOSEN].rms < c.errors[LEAST].rms,
         "others": [(h / 60, *orders) for h, (orders, _, _) in c.clocks.items()],
     }
+
+
+@claims.facts
+def _net(c: Computed) -> Facts:
+    return {"others": [(name, c.errors[name].rms) for name in c.models if name not in (NET, LEAST, CHOSEN)]}
 
 
 @claims.facts
@@ -82,6 +89,15 @@ def _depth(c: Computed) -> Facts:
 
 
 @claims.facts
+def _between(c: Computed) -> Facts:
+    means = {name: float(np.mean([k.means[1] for k in tests])) for name, tests in c.between.items()}
+    without = float(np.mean([k.means[0] for k in c.between[LINEAR]]))
+    joined = [[k.scheduled for k in tests] for name, tests in c.between.items() if name != setup.NEAREST]
+    holds = max(means.values()) <= setup.SHARE * without
+    return {"without": without, "means": means, "apart": np.ptp(joined, axis=0).max(), "holds": holds}
+
+
+@claims.facts
 def _warm(c: Computed) -> Facts:
     cold, carried, none = (rms(e[c.warm.hours <= 1]) for e in (c.warm.cold, c.warm.carried, c.warm.drift))
     return {"cold": cold, "carried": carried, "none": none, "harmful": cold > none}
@@ -94,11 +110,13 @@ def _tables(c: Computed) -> tuple[StudyTable, ...]:
     order = range(setup.GREATEST + 1)
     table = {(o.k, o.m): o for o in c.orders[0]}
     left = {(f"z at {p} mm", name): e[:, j] for j, p in enumerate(POSITIONS) for name, e in c.left.items()}
+    between = [(name, np.mean([np.abs(k.scheduled) for k in tests], axis=0)) for name, tests in c.between.items()]
     return (
         exhibits.table("orders", [(k, [_fpe(table.get((k, m))) for m in order]) for k in order]),
         errors_table("Free run in the verification: residual", left),
         exhibits.table("clocks", [(h / 60, *clock) for h, clock in c.clocks.items()]),
         exhibits.table("cuts", [(n, k.without, k.scheduled) for n, k in enumerate(c.cuts, start=1)]),
+        exhibits.table("between", [(NONE, np.mean([np.abs(k.without) for k in c.between[LINEAR]], axis=0)), *between]),
     )
 
 

@@ -1,11 +1,12 @@
 """Computation of the study of pre-compensation; `thermocomp.papers.precompensation.redo` presents it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator, CubicSpline, interp1d
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
@@ -23,6 +24,16 @@ from thermocomp.virtual.protocol import Experiment
 SPEED = "spindle_rpm"
 #: positions of Z with a drift model (P-04) [mm]
 POSITIONS = (0, 200, 400, 600)
+#: positions halfway between them [mm], and functions that interpolate there (P-04, P-07); nearest: the lower one
+BETWEEN = (100, 300, 500)
+NEAREST, LINEAR = "nearest model", "piecewise linear"
+INTERPOLATIONS: Mapping[str, Callable[..., Any]] = {
+    NEAREST: partial(interp1d, kind="nearest", axis=1),
+    LINEAR: partial(interp1d, axis=1),
+    "quadratic spline": partial(interp1d, kind="quadratic", axis=1),
+    "natural cubic spline": partial(CubicSpline, bc_type="natural", axis=1),
+    "cubic polynomial": partial(BarycentricInterpolator, axis=1),
+}
 #: orders of the paper (P-02), and largest orders tried
 PAPERS_ORDERS = (1, 0)
 GREATEST = 5
@@ -97,6 +108,8 @@ class Computed:
         One-step-ahead RMS of least squares with k = 1, m = 0 over all positions [um].
     clocks : dict of float to (tuple of int, float, float)
         By interval [s], at the first position: orders by FPE, free-run RMS with these, and with k = 1, m = 0 [um].
+    between : dict of str to list of CuttingTest
+        Cutting tests at `BETWEEN`, by the name of the interpolation.
     room : float
         Peak-to-peak drift of Z of a machine at rest for a day [um]: no part of it can be predicted from the speed
         (E-P6).
@@ -112,6 +125,7 @@ class Computed:
     one_step: float
     clocks: dict[float, tuple[tuple[int, int], float, float]]
     cuts: list[CuttingTest]
+    between: dict[str, list[CuttingTest]]
     warm: Warm
     room: float
     workshop: float
@@ -161,7 +175,7 @@ class Computed:
         """Return the prediction for position k by linear interpolation between the models of all other positions."""
         others = [j for j in range(len(POSITIONS)) if j != k]
         nodes = [float(POSITIONS[j]) for j in others]
-        return np.array([np.interp(POSITIONS[k], nodes, row) for row in self.free_run[name][:, others]])
+        return np.asarray(INTERPOLATIONS[LINEAR](nodes, self.free_run[name][:, others])(POSITIONS[k]))
 
 
 def compute(seed: int, progress: Progress) -> Computed:
@@ -187,10 +201,13 @@ def compute(seed: int, progress: Progress) -> Computed:
     clocks = {h: _clock(learn, judge, h, timed) for h in INTERVALS}
     progress(0.6, "cutting tests")
     cuts = [cut(record("precompensation-cut", seed=seed + n)[0], models[NET]) for n in range(CUTS)]
+    there = changed("precompensation-cut", probes=tuple(f"z_at_{p}" for p in BETWEEN))
+    tests = [record(there, seed=seed + n)[0] for n in range(CUTS)]
+    between = {f: [cut(test, models[NET], BETWEEN, f) for test in tests] for f in INTERPOLATIONS}
     progress(0.9, "a warm machine, and another room")
     still = record("etve", seed=seed)[0]
     room = Errors.of(still.table["z_um"].to_numpy(dtype=np.float64)).peak_to_peak
-    workshop = samples_of(record(in_a_workshop(find_experiment("precompensation")), seed=seed)[-1])
+    workshop = samples_of(record(changed("precompensation", climate=Climate()), seed=seed)[-1])
     left = workshop.deviations - at_positions(models[NET], workshop)
     warm = warm_start(judge, models[NET][0])
     return Computed(
@@ -202,20 +219,22 @@ def compute(seed: int, progress: Progress) -> Computed:
         one_step=rms(np.concatenate(steps)),
         clocks=clocks,
         cuts=cuts,
+        between=between,
         warm=warm,
         room=room,
         workshop=rms(left),
     )
 
 
-def samples_of(recording: Recording) -> Samples:
-    """Return samples of the drift of Z at all positions, with the spindle speed as the only input (P-01)."""
-    return stacked([recording], [f"z_at_{p}_um" for p in POSITIONS], [SPEED])
+def samples_of(recording: Recording, positions: Sequence[int] = POSITIONS) -> Samples:
+    """Return samples of the drift of Z at some positions, with the spindle speed as the only input (P-01)."""
+    return stacked([recording], [f"z_at_{p}_um" for p in positions], [SPEED])
 
 
-def in_a_workshop(experiment: Experiment) -> Experiment:
-    """Return the same tests in a workshop that is not air-conditioned, instead of a measuring room."""
-    return replace(experiment, tests=tuple(replace(plan, climate=Climate()) for plan in experiment.tests))
+def changed(name: str, **settings: Any) -> Experiment:
+    """Return the same tests with other settings, such as a workshop instead of a measuring room."""
+    experiment = find_experiment(name)
+    return replace(experiment, tests=tuple(replace(plan, **settings) for plan in experiment.tests))
 
 
 def at_positions(models: Sequence[ErrorModel], samples: Samples) -> FloatArray:
@@ -243,15 +262,26 @@ def schedule_corrections(time: FloatArray, predictions: FloatArray) -> FloatArra
     return np.asarray(opposed(predictions[begins]), dtype=np.float64)
 
 
-def cut(recording: Recording, models: Sequence[ErrorModel]) -> CuttingTest:
-    """Simulate milling a surface cold and another after an hour, without and with a corrected program (P-07)."""
-    samples = samples_of(recording)
+def cut(
+    recording: Recording, models: Sequence[ErrorModel], positions: Sequence[int] = POSITIONS, function: str = LINEAR
+) -> CuttingTest:
+    """Simulate milling a surface cold and another after an hour, without and with a corrected program (P-07).
+
+    Parameters
+    ----------
+    positions : sequence of int
+        Positions of the surfaces [mm].
+    function : str
+        Interpolation between the models, of `INTERPOLATIONS`.
+    """
+    samples = samples_of(recording, positions)
     running = np.flatnonzero(samples.values[:, 0] > 0)
     minutes = samples.time / 60
     first = (minutes >= minutes[running[0]]) & (minutes < minutes[running[0]] + MILLING)
     last = (minutes > minutes[running[-1]] - MILLING) & (minutes <= minutes[running[-1]])
     z = samples.deviations
-    corrected = z + schedule_corrections(samples.time, at_positions(models, samples))
+    predicted = INTERPOLATIONS[function](POSITIONS, at_positions(models, samples))(positions)
+    corrected = z + schedule_corrections(samples.time, predicted)
     return CuttingTest(*(values[last].mean(axis=0) - values[first].mean(axis=0) for values in (z, corrected)))
 
 
