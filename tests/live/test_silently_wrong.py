@@ -31,6 +31,7 @@ from thermocomp.live.loop import Service
 from thermocomp.live.page.snapshot import snapshot
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.lines import DeviationLine, constant
+from thermocomp.runtime.orders import AVERAGED, wait_for_start, zero_anew
 
 
 def shown(own: Service) -> dict[str, Any]:
@@ -161,6 +162,20 @@ def test_repeated_values_are_no_good_sensors() -> None:
     assert snapshot(own, 1.0)["sensors"][0]["state"] == "stale"
     own.take(Reading(time.time(), {"t": 22.1}))
     assert snapshot(own, 1.0)["sensors"][0]["state"] == "not watched"
+
+
+def test_a_new_zero_is_not_taken_from_a_source_that_has_stopped() -> None:
+    own = Service(machine(), [], [])
+    for k in range(60):
+        own.take(Reading(time.time(), {"t": 20.0 + 0.01 * (k % 7)}))
+    for _ in range(30):
+        own.take(Reading(time.time(), {"t": 22.0}))
+    own.state = zero_anew(own.compensator, wait_for_start(own.state, "z_um", AVERAGED))
+    for _ in range(30):
+        own.take(Reading(time.time(), {"t": 22.0}))
+    assert own.state.references == {}
+    own.take(Reading(time.time(), {"t": 22.1}))
+    assert "z_um" in own.state.references
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -135,7 +135,7 @@ def find_boot() -> tuple[str, float] | None:
 
 
 def _written(stored: _Stored) -> datetime:
-    """Return when a state was written, on the present clock, which may have been set since; the time since boot is not."""
+    """Return when a state was written, on the present clock, which may have been set; the time since boot is not."""
     boot = find_boot()
     if boot is None or boot[0] != stored.boot or not 0.0 <= stored.uptime <= boot[1]:
         return stored.written
