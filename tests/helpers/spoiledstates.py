@@ -16,6 +16,7 @@ def _cut(state: Path) -> None:
 def _date_back(state: Path) -> None:
     (entry,) = json.loads(state.read_text())["models"]
     entry["written"] = (datetime.fromisoformat(entry["written"]) - timedelta(days=2)).isoformat()
+    entry["boot"] = ""
     state.write_text(jsonfile.pack(statefile.KIND, [entry]))
 
 

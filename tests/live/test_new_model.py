@@ -337,7 +337,7 @@ def test_after_a_day_the_machine_is_cold(tmp_path: Path) -> None:
     machine = Machine(tmp_path)
     machine.run(machine.service(model("dynamic", MORE)), SWITCH)
     left = machine.corrections[-1]
-    rewritten(tmp_path / "state.json", lambda entry: entry.update(written="2026-01-02T03:04:05+00:00"))
+    rewritten(tmp_path / "state.json", lambda entry: entry.update(written="2026-01-02T03:04:05+00:00", boot=""))
     refit = machine.service(model("averaged", MORE))
     assert refit.events[0].text.startswith("cold start: the state of 2026-01-02 03:04 UTC belongs to other models")
     assert refit.state.corrections["z_um"].offset == left
@@ -349,7 +349,7 @@ def test_after_a_day_the_machine_is_cold(tmp_path: Path) -> None:
 def test_a_clock_set_back_since_then_is_a_cold_start(tmp_path: Path) -> None:
     machine = Machine(tmp_path)
     machine.run(machine.service(model("dynamic", MORE)), 600)
-    rewritten(tmp_path / "state.json", lambda entry: entry.update(written="2126-01-02T03:04:05+00:00"))
+    rewritten(tmp_path / "state.json", lambda entry: entry.update(written="2126-01-02T03:04:05+00:00", boot=""))
     refit = machine.service(model("averaged", MORE))
     assert refit.events[0].text.startswith("cold start: the state of 2126-01-02")
     assert refit.state.away is not None
@@ -360,7 +360,7 @@ def test_an_outage_of_hours_counts_as_with_the_same_models(tmp_path: Path) -> No
     machine = Machine(tmp_path)
     machine.run(machine.service(model("dynamic", MORE)), 1300)
     written = datetime.now(UTC) - timedelta(hours=3)
-    rewritten(tmp_path / "state.json", lambda entry: entry.update(written=written.isoformat()))
+    rewritten(tmp_path / "state.json", lambda entry: entry.update(written=written.isoformat(), boot=""))
     machine.row, machine.corrections = 1300 + 540, machine.corrections + [machine.corrections[-1]] * 540
     refit = machine.service(model("averaged", MORE))
     machine.run(refit, 1841)

@@ -66,10 +66,10 @@ def offsets(heard: list[tuple[float, dict[str, Any]]]) -> list[tuple[float, floa
 
 
 def dated(state: Path, earlier: timedelta) -> None:
-    """Let a state file have been written earlier."""
+    """Let a state file have been written earlier, before this computer was started."""
     (entry,) = json.loads(state.read_text())["models"]
     entry["written"] = (datetime.fromisoformat(entry["written"]) - earlier).isoformat()
-    state.write_text(jsonfile.pack(statefile.KIND, [entry]))
+    state.write_text(jsonfile.pack(statefile.KIND, [entry | {"boot": ""}]))
 
 
 def ran(own: Service, work: Callable[[], Awaitable[None]]) -> None:

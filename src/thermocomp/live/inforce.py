@@ -10,6 +10,7 @@ from thermocomp.core.ports import Confirming, Sink, Suspending
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.links import Outlet
 from thermocomp.live.recorder import CONFIRM_WITHIN
+from thermocomp.runtime.lines import DeviationLine
 from thermocomp.runtime.state import NO_ZERO, CompensatorState, Status
 
 #: difference from the corrections sent lately above which another one is in force [um]
@@ -30,10 +31,10 @@ class AtController(NamedTuple):
 class ConfirmedCorrections:
     """Corrections that controllers have confirmed, and their alarms."""
 
-    def __init__(self, sinks: Sequence[Sink], clock: ServiceClock) -> None:
+    def __init__(self, sinks: Sequence[Sink], clock: ServiceClock, lines: Mapping[str, DeviationLine]) -> None:
         # the report of a controller takes precedence over that of a file
         controllers: list[Sink] = [s for s in sinks if confirms(s)]
-        self._sure, self._clock = controllers or list(sinks), clock
+        self._sure, self._clock, self._lines = controllers or list(sinks), clock, lines
         self._alarms = dict[str, str]()
         self._demanded = deque[tuple[float, Mapping[str, Correction]]](maxlen=1000)
         #: correction and time of its confirmation, by target [um, s]
@@ -53,13 +54,15 @@ class ConfirmedCorrections:
 
     def _differs(self, target: str, found: Correction) -> str:
         """Return how a confirmed correction differs from all those sent lately; empty if it does not."""
-        since, positions = self._clock.tick() - 2 * CONFIRM_WITHIN * self._clock.speed, (0.0, found.reference_position)
+        since = self._clock.tick() - 2 * CONFIRM_WITHIN * self._clock.speed
         lately = [c[target] for at, c in self._demanded if target in c and at >= since]
         lately = lately or [c[target] for _, c in list(self._demanded)[-1:] if target in c]
-        for p in positions if lately else ():
+        for p in self._lines[target].travel if lately else ():
             low, high = min(c.at(p) for c in lately), max(c.at(p) for c in lately)
             if not low - ASIDE <= found.at(p) <= high + ASIDE:
-                return f"the controller has {found.at(p):+.1f} um in force, where {lately[-1].at(p):+.1f} um were sent"
+                at = f"at {p:g} mm, " if found.slope or lately[-1].slope else ""
+                sent = f"{lately[-1].at(p):+.1f} um were sent"
+                return f"{at}the controller has {found.at(p):+.1f} um in force, where {sent}"
         return ""
 
     def of(self, target: str, state: CompensatorState) -> Correction | None:
@@ -76,8 +79,9 @@ class ConfirmedCorrections:
             return AtController("not sent", "no sink receives this correction")
         for one in mine:
             link = one.status()
-            if link.state != "connected":
-                return AtController("not confirmed", f"{one.name}: {link.reason or link.state}")
+            lost = link.state != "connected" and (link.reason or link.state)
+            if why := lost or getattr(one.sink, "other_sender", ""):
+                return AtController("not confirmed", f"{one.name}: {why}")
         controllers = [one for one in mine if confirms(one.sink)]
         if not controllers:
             return AtController("sent, not confirmed", f"{mine[0].name} does not confirm what the controller has")

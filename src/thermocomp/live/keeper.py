@@ -88,6 +88,8 @@ class StateKeeper:
         held = [o for o in state.orders.values() if o.word == NO_ZERO]
         if not recent:
             self.cold, self._aged = f"{self._path.name} is {_tell_age(age)}", state.corrections
+            if age < 0.0 and any(max(abs(d.offset), abs(d.slope)) > WARM for d in saved.state.raw.values()):
+                state = self._hold(state, f"{self.cold}, and the machine was warm when it was written: {_ASKED}")
         elif self._zero is None:
             self.no_zero = held[0] if held else None
         elif self._zero.begun != state.zeroed:

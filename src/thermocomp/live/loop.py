@@ -24,6 +24,7 @@ from thermocomp.live.rebuild import rebuild
 from thermocomp.live.recorder import Recorder
 from thermocomp.live.stamps import explain_stamp
 from thermocomp.live.startvalues import WAITS, AtStart, StartValues
+from thermocomp.live.storedzero import inputs_of
 from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, start_from, wait_for_start, withdraw, zero_anew
@@ -64,10 +65,13 @@ class Service:
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
 
     def __post_init__(self) -> None:
-        models = self.compensator.models
-        self.latest = Latest(i.name for m in models for i in (*m.inputs, *(m.watch.inputs if m.watch else ())))
+        inputs = inputs_of(self.compensator)
+        self.latest = Latest(i.name for i in inputs)
+        # a spindle that turns the other way (M4) causes the same heat
+        self._unsigned = {i.name for i in inputs if i.quantity == "spindle_speed" and i.low >= 0.0}
         self.start_values = StartValues(self.compensator)
-        self.curves, self.in_force = Curves(self.compensator), ConfirmedCorrections(self.sinks, self.clock)
+        self.curves = Curves(self.compensator)
+        self.in_force = ConfirmedCorrections(self.sinks, self.clock, self.compensator.lines)
         self.probings = ProbingLedger(self.compensator, self.clock, partial(self.say, "probing"))
         self.keeper = StateKeeper(self.state_path, self.compensator, self.clock, partial(self.say, "service"))
         self.outlets = [Outlet(sink, self._hear if self.in_force.listens_to(sink) else None) for sink in self.sinks]
@@ -122,7 +126,8 @@ class Service:
                 self._told_untimely = tick
             self._untimely = why, tick
             return
-        if left_out := self.latest.take(reading.values, tick, most, tick - max(now - stamp, 0.0)):
+        values = {n: abs(v) if n in self._unsigned else v for n, v in reading.values.items()}
+        if left_out := self.latest.take(values, tick, most, tick - max(now - stamp, 0.0)):
             self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
         if self.latest.behind > BEHIND * self.clock.speed and tick - self._told_behind > SELDOM * self.clock.speed:
             self.say(

@@ -4,8 +4,9 @@ import hashlib
 import json
 import math
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from time import CLOCK_BOOTTIME, clock_gettime
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +40,8 @@ class _Stored:
     models: str
     state: dict[str, Any]
     zero: dict[str, Any] | None = None
+    boot: str = ""  # of the computer, and the time since then: its clock may be set
+    uptime: float = 0.0
 
 
 class _Readings(NamedTuple):
@@ -88,6 +91,8 @@ def dumps(
         "state": encode(state),
         "zero": encode(zero_of(state, compensator, before)),
     }
+    if (boot := find_boot()) is not None:
+        entry |= {"boot": boot[0], "uptime": boot[1] - (datetime.now(UTC) - written).total_seconds()}
     return jsonfile.pack(KIND, [entry])
 
 
@@ -107,7 +112,8 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         _check(state, compensator)
     except (ValueError, InputError) as e:
         raise ModelFileError(f"{source}: not a valid state of these models: {e}; start without the file") from e
-    return Saved(stored.written, compensator.share(state.models, state), decode_zero(stored.zero, stored.written))
+    written = _written(stored)
+    return Saved(written, compensator.share(state.models, state), decode_zero(stored.zero, written))
 
 
 def read_zero(path: str | Path) -> StateOfOthers | None:
@@ -117,7 +123,24 @@ def read_zero(path: str | Path) -> StateOfOthers | None:
         stored = jsonfile.unpack(KIND, _Stored, text, source).models[0]
     except ThermocompError:
         return None
-    return decode_zero(stored.zero, stored.written)
+    return decode_zero(stored.zero, _written(stored))
+
+
+def find_boot() -> tuple[str, float] | None:
+    """Return the id of the present run of this computer, and the time since its start [s]; None if unknown."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip(), clock_gettime(CLOCK_BOOTTIME)
+    except (OSError, ValueError):
+        return None
+
+
+def _written(stored: _Stored) -> datetime:
+    """Return when a state was written, on the present clock, which may have been set; the time since boot is not."""
+    boot = find_boot()
+    if boot is None or boot[0] != stored.boot or not 0.0 <= stored.uptime <= boot[1]:
+        return stored.written
+    found = datetime.now(UTC) - timedelta(seconds=boot[1] - stored.uptime)
+    return stored.written if abs((found - stored.written).total_seconds()) < 1.0 else found
 
 
 def _of_version_1(entry: dict[str, Any]) -> dict[str, Any]:

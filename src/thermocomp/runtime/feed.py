@@ -77,7 +77,7 @@ class TemperatureFeed:
                 stands = f"the counter of the readings has been {number:g} for {feed.waited:.0f} s"
                 return feed, f"{stands}: the source has stopped"
             if not advances:
-                return feed, self._explain(feed)
+                return feed, self.explain(feed)
         given = tuple([_temperature(values.get(name)) for name in self.names])
         if len(feed.values) != len(given):  # at the start, or with another configuration
             return FeedState(given, (NONE,) * len(given), counter=feed.counter, waited=feed.waited), ""
@@ -89,7 +89,7 @@ class TemperatureFeed:
             feed = self._learn(feed, changed)._replace(values=given, steps=steps, repeated=0.0, predicted=(), moved="")
         elif any(v != NONE for v in given):
             feed = feed._replace(repeated=min(feed.repeated + 1.0, MOST_REPEATED))
-        return feed, self._explain(feed)
+        return feed, self.explain(feed)
 
     def _learn(self, feed: FeedState, changed: int) -> FeedState:
         """Return the state with the interval that a change ends, averaged.
@@ -109,7 +109,7 @@ class TemperatureFeed:
             longest=max(feed.longest, interval) if few else feed.longest,
         )
 
-    def _explain(self, feed: FeedState) -> str:
+    def explain(self, feed: FeedState) -> str:
         """Return why the feed has stopped; empty if it has not."""
         limits = self._thresholds
         most = limits.repeat_factor * feed.usual
@@ -141,7 +141,7 @@ class TemperatureFeed:
             if far.any():
                 k = int(np.argmax(far))
                 feed = feed._replace(moved=f"{watch.names[k]} should have changed by {moved[k]:+.2f} degC")
-                return feed, self._explain(feed)
+                return feed, self.explain(feed)
         return feed, ""
 
 

@@ -74,7 +74,7 @@ AVERAGED = Status(NO_ZERO, "a new zero was ordered, and is being averaged")
 def zero_anew(compensator: Compensator, state: CompensatorState) -> CompensatorState:
     """Start all models anew, to take a new zero; corrections are kept. Targets without a zero wait for `rezero`."""
     orders = {t: AVERAGED if s.word == NO_ZERO else s for t, s in state.orders.items()}
-    begun = compensator.start()
+    begun = compensator.start()._replace(feed=state.feed)  # a source that has stopped is still known
     return begun._replace(corrections=state.corrections, orders=orders, clock=state.clock, probed=state.probed)
 
 

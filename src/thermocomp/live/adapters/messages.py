@@ -39,6 +39,8 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
     if stamp is not None and _number(stamp) is None:
         raise ReadingError(f"a message with time {escape(stamp, 40)!r}: expected seconds since 1970")
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
+    if not values:
+        raise ReadingError('a message without any number; expected a number for each channel, {"t1_C": 21.3}')
     return Reading(arrived if stamp is None else float(stamp), values)
 
 

@@ -4,6 +4,7 @@ import asyncio
 import json
 import math
 import time
+from collections import deque
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,6 +21,9 @@ from thermocomp.live.adapters.connection import Connection
 from thermocomp.live.adapters.inbox import Inbox
 from thermocomp.live.adapters.messages import read_corrections, read_message, read_time, write_message
 from thermocomp.live.adapters.reportedchanges import ReportedChanges
+
+#: time for which another sender on the topic of a sink is reported after its last message [s]
+OTHER = 60.0
 
 
 @dataclass(kw_only=True)
@@ -168,7 +172,7 @@ class MqttSink(Broker):
     """Sink that publishes corrections on an MQTT topic, and whether it runs on the topic with ``/status`` appended.
 
     Both messages are retained: a consumer that connects later gets them at once. If the connection breaks, the broker
-    publishes the status ``lost``.
+    publishes the status ``lost``, which is replaced at once if it is that of an earlier connection or another sender.
 
     Parameters
     ----------
@@ -186,6 +190,13 @@ class MqttSink(Broker):
     _before: dict[str, Correction] | None = field(default=None, init=False, repr=False)
     _reported: dict[str, Correction] | None = field(default=None, init=False, repr=False)
     _listening: asyncio.Task[None] | None = field(default=None, init=False, repr=False)
+    _own: deque[bytes] = field(default_factory=lambda: deque(maxlen=100), init=False, repr=False)  # published last
+    _other: float = field(default=-math.inf, init=False, repr=False)  # last message of another sender [s]
+
+    @property
+    def other_sender(self) -> str:
+        """Whether another sender has published here lately, as text; empty if none has."""
+        return "another sender publishes on this topic" if time.monotonic() - self._other <= OTHER else ""
 
     def inform(self, statuses: Mapping[str, TargetStatus]) -> None:
         """Store the statuses for the next corrections."""
@@ -205,37 +216,43 @@ class MqttSink(Broker):
         self._before = self._reported = None
         try:
             async with asyncio.timeout(timeout):
-                for topic in filter(None, (self.topic, self.confirm_topic)):
+                for topic in filter(None, (self.topic, self._status_topic, self.confirm_topic)):
                     await client.subscribe(topic, qos=1)
-                await client.publish(self._status_topic, _status("running"), qos=1, retain=True)
+                await self._publish(self._status_topic, _status("running"), timeout)
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             await self._hang_up()
             raise self._fail(e) from e
         self._listening = asyncio.create_task(self._listen(client))
 
     async def _listen(self, client: aiomqtt.Client) -> None:
-        """Read the retained message of an earlier run, and what the controller confirms, until the connection is lost.
-
-        Our own messages are of no interest: the subscription ends with the first of them.
-        """
+        """Read what was sent by an earlier run and by others, and what the controller confirms, until it is lost."""
         try:
             async for message in client.messages:
-                payload = message.payload if isinstance(message.payload, bytes | str) else b""
+                payload = message.payload if isinstance(message.payload, bytes) else b""
+                of_others = not message.retain and payload not in self._own
+                if message.topic.matches(self._status_topic):
+                    if of_others and b'"running"' not in payload:  # lost: an earlier connection, or another sender
+                        await self._publish(self._status_topic, _status("running"), 3.0)
+                    continue
+                if message.topic.matches(self.topic) and not message.retain:
+                    self._other = time.monotonic() if of_others and payload else self._other
+                    continue
                 try:
                     found = read_corrections(payload)
                 except ReadingError as e:
-                    if not message.topic.matches(f"{self.topic}/status"):
-                        self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
+                    self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
                     continue
                 if message.topic.matches(self.topic):
-                    if message.retain:
-                        self._before, self.last_time = found, read_time(payload)
-                    await client.unsubscribe(self.topic)
+                    self._before, self.last_time = found, read_time(payload)
                 elif not message.retain:
                     self._reported = found
         except (aiomqtt.MqttError, OSError, ValueError) as e:
             if client is self._client:
                 self._fail(e)
+
+    async def _publish(self, topic: str, text: str, timeout: float) -> None:
+        self._own.append(text.encode())
+        await self._connected().publish(topic, text, qos=1, retain=True, timeout=timeout)
 
     async def last_sent(self) -> Mapping[str, Correction] | None:
         """Return the corrections in the retained message of an earlier run; None without one."""
@@ -251,7 +268,7 @@ class MqttSink(Broker):
         text = write_message(corrections, time.time(), self._statuses, self._sequence)
         try:
             # acknowledged: a broker that does not answer is found
-            await self._connected().publish(self.topic, text, qos=1, retain=True, timeout=3.0)
+            await self._publish(self.topic, text, 3.0)
         except (aiomqtt.MqttError, OSError, TimeoutError, ValueError) as e:
             raise self._fail(e) from e
 
@@ -259,8 +276,7 @@ class MqttSink(Broker):
         """Publish that the compensator has stopped, and close the connection; idempotent."""
         if self._client is not None and self._connection.now.state == "connected":
             with suppress(aiomqtt.MqttError, OSError, TimeoutError, ValueError):
-                told = _status("stopped", "corrections are unchanged")
-                await self._client.publish(self._status_topic, told, qos=1, retain=True, timeout=1.0)
+                await self._publish(self._status_topic, _status("stopped", "corrections are unchanged"), 1.0)
         await self._hang_up()
 
     async def _hang_up(self) -> None:

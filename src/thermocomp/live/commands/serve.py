@@ -90,7 +90,7 @@ def _serve(settings: "ServiceSettings", port: int | None, *, check: bool) -> int
     for target in service.compensator.lines:
         order = service.state.orders.get(target)
         console.print(
-            words(f"{target}: {'runs' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
+            words(f"{target}: {'may run' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
         )
     token = web.read_token(settings.folder / page.token_file) if page is not None and page.token_file else ""
     if check:

@@ -36,9 +36,11 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
     said, now, tick = service.said, service.clock.now(), service.clock.tick()
     failed = said.failed if said else {}
     watched = {name for watch in service.compensator.watches for name in watch.failing}
+    feed = service.compensator.feed
+    repeated = feed.names if feed.explain(service.state.feed) else ()
 
     def word(name: str, age: float) -> str:
-        if age > service.compensator.limits.reading_age:
+        if age > service.compensator.limits.reading_age or name in repeated:
             return "stale"
         return "good" if name in watched else "not watched"
 
@@ -73,7 +75,8 @@ def find_alarms(service: Service) -> Iterator[str]:
         order = service.state.orders.get(name)
         if order is not None and order.word in (*UNKNOWN, NO_ZERO):
             yield f"{name}: {order.word}: {order.reason}"
-        elif there.word == "not confirmed" and name not in service.compensator.shadow:
+        waits = order is not None and order.word in UNKNOWN
+        if there.word == "not confirmed" and not waits and name not in service.compensator.shadow:
             yield f"{name}: not confirmed: {there.reason}"
     for one in service.links():
         if (link := one.status()).state == "failed" or (link.state == "closed" and link.reason and not one.ended):
