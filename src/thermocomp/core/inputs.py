@@ -60,6 +60,14 @@ class Input:
                 "the second"
             )
 
+    @property
+    def unsigned(self) -> bool:
+        """Whether only the amount counts: a speed that was never negative in the training data.
+
+        A spindle that turns the other way (M4) causes the same heat.
+        """
+        return self.quantity == "spindle_speed" and self.reference + self.low >= 0.0
+
 
 @dataclass(frozen=True)
 class Support:

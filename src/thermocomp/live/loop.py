@@ -65,10 +65,7 @@ class Service:
     counts: dict[str, int] = field(default_factory=lambda: {"readings": 0, "rejected": 0}, init=False)
 
     def __post_init__(self) -> None:
-        inputs = inputs_of(self.compensator)
-        self.latest = Latest(i.name for i in inputs)
-        # a spindle that turns the other way (M4) causes the same heat
-        self._unsigned = {i.name for i in inputs if i.quantity == "spindle_speed" and i.low >= 0.0}
+        self.latest = Latest(i.name for i in inputs_of(self.compensator))
         self.start_values = StartValues(self.compensator)
         self.curves = Curves(self.compensator)
         self.in_force = ConfirmedCorrections(self.sinks, self.clock, self.compensator.lines)
@@ -126,8 +123,7 @@ class Service:
                 self._told_untimely = tick
             self._untimely = why, tick
             return
-        values = {n: abs(v) if n in self._unsigned else v for n, v in reading.values.items()}
-        if left_out := self.latest.take(values, tick, most, tick - max(now - stamp, 0.0)):
+        if left_out := self.latest.take(reading.values, tick, most, tick - max(now - stamp, 0.0)):
             self.say("link", f"too many names that no model uses; {left_out!r} and others are ignored")
         if self.latest.behind > BEHIND * self.clock.speed and tick - self._told_behind > SELDOM * self.clock.speed:
             self.say(

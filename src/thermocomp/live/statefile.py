@@ -3,10 +3,10 @@
 import hashlib
 import json
 import math
+import time
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from time import CLOCK_BOOTTIME, clock_gettime
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,8 +129,9 @@ def read_zero(path: str | Path) -> StateOfOthers | None:
 def find_boot() -> tuple[str, float] | None:
     """Return the id of the present run of this computer, and the time since its start [s]; None if unknown."""
     try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip(), clock_gettime(CLOCK_BOOTTIME)
-    except (OSError, ValueError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
+        return boot, time.clock_gettime(time.CLOCK_BOOTTIME)
+    except (AttributeError, OSError, ValueError):  # other systems
         return None
 
 
@@ -174,9 +175,9 @@ def _watch_of_version_1(entry: Any, place: str) -> Any:
 def _mean(entry: Any, place: str) -> Any:
     readings, averaged = decode(_Readings, entry, place), ZeroMean()
     want(len(readings.times) == len(readings.values), None, place, "a time for each reading")
-    for time, values in zip(readings.times, readings.values, strict=True):
-        want(math.isfinite(time) and not time <= averaged.last, time, f"{place}.times", "increasing numbers")
-        averaged = averaged.add(time, values, readings.resting)
+    for at, values in zip(readings.times, readings.values, strict=True):
+        want(math.isfinite(at) and not at <= averaged.last, at, f"{place}.times", "increasing numbers")
+        averaged = averaged.add(at, values, readings.resting)
     return encode(averaged)
 
 

@@ -72,6 +72,8 @@ def run(
     """
     stands = np.zeros(len(time), dtype=np.bool_) if resting is None else resting
     complete = np.asarray(np.isfinite(values).all(axis=1))
+    amounts = np.array([i.unsigned for i in model.inputs], dtype=np.bool_)
+    values = np.where(amounts, np.abs(values), values)
     gate = _gated(model, time, values, stands, model.init(reference).reference)
     zero, rested = find_test_zero(model, time, values, stands, complete, reference)
     alone = _said(model, time, rested, complete, zero)

@@ -12,8 +12,9 @@ reading and takes effect from the next reading onwards: it measures the error of
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -74,6 +75,12 @@ class Compensator:
     limits: Limits = Limits()
     watching: bool = False
     repeats: Literal["watch", "exception"] = "watch"
+
+    @cached_property
+    def unsigned(self) -> frozenset[str]:
+        """Channels of which only the amount counts: see `Input.unsigned`."""
+        inputs = [*(i for m in self.models for i in m.inputs), *(i for w in self.watches for i in w.inputs)]
+        return frozenset(i.name for i in inputs if i.unsigned) - {i.name for i in inputs if not i.unsigned}
 
     @cached_property
     def watches(self) -> tuple[Watch, ...]:
@@ -253,6 +260,8 @@ class Compensator:
         (fresh, known_before), tick = sift(state, probings), now if tick is None else tick
         instant, why = place(state, reading, now, tick, self.limits, self.thresholds)
         if not why:
+            if negative := [n for n in self.unsigned if _is_negative(reading.values.get(n))]:
+                reading = replace(reading, values={**reading.values, **{n: -reading.values[n] for n in negative}})
             state, reading, why = self._believe(state, reading, instant.time, tick)
         if why := why or self.gate(state, reading):
             state, said = self.wait(state, tick, why)
@@ -384,6 +393,11 @@ class Compensator:
             reading = Reading(reading.time, values, reading.positions)
         feed, why = self.feed.compare_predictions(feed, states)
         return state._replace(watches=tuple(states), feed=feed), reading, why
+
+
+def _is_negative(value: object) -> bool:
+    """Return whether a value is a number below zero; what a source sends may be anything."""
+    return isinstance(value, Real) and value < 0
 
 
 def _unjudged(models: Sequence[ErrorModel], failed: Mapping[str, str]) -> str:

@@ -83,6 +83,7 @@ class Fleet:
         )
         # full arrays: numpy takes three times as long with a broadcast bound
         self._least, self._most = (np.repeat(b[:, None], n, axis=1).astype(kind) for b in (least, most))
+        self._unsigned = np.array([k for k, i in enumerate(model.inputs) if i.unsigned], dtype=np.intp)
         inputs = [signal[0] for signal in model.signals]
         self._follows = np.array([inputs[k] for k in model.lag_signals], dtype=np.intp)
         self._direct = np.bincount(inputs, model.direct, len(model.inputs)).astype(kind)
@@ -119,6 +120,7 @@ class Fleet:
         values, followed, memory = self._values, self._followed, self._memory
         with np.errstate(invalid="ignore", over="ignore"):
             values[...] = readings
+            values[self._unsigned] = np.abs(values[self._unsigned])
             plausible = (values >= self._low) & (values <= self._high)
             used: NDArray[np.bool_] = np.logical_and.reduce(plausible, axis=0)
             np.subtract(values, self._zero, out=values)

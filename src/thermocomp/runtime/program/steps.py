@@ -33,6 +33,8 @@ def step(s: Kept, w: Work, t: Constants) -> None:
     """Process a reading of a given age, and move the corrections."""
     tell_time(s, w, t)
     for c in each("c", t.CHANNELS):
+        with when(t.has_unsigned), when(t.unsigned[c]):
+            w.value[c] = abs(w.value[c])
         w.given[c] = (w.value[c] >= -1e30) & (w.value[c] <= 1e30)  # False for NaN
     find_standstill(s, w, t)
     with when(w.passes):

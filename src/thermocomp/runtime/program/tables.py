@@ -110,6 +110,7 @@ def gather(compensator: Compensator) -> Tables:
         "at_rest": zeroing.at_rest,
         "otherwise": zeroing.otherwise,
         "speed_channel": place.get(zeroing.speed, 0),
+        "unsigned": [c.name in compensator.unsigned for c in channels],
         **_ranges(ranges, models, place, thresholds),
         "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
         "set_range": [ranges.index(i) for s in sets for i in s],
@@ -134,6 +135,7 @@ def gather(compensator: Compensator) -> Tables:
         "ENDS": 2,
         "COLUMN": max(len(ranges), len(sensors), 2),  # to sort one, gcc would warn of the index 1
         "has_speed": int(bool(zeroing.speed)),
+        "has_unsigned": int(bool(compensator.unsigned)),
         **_sizes(values),
         **_watch_sizes(watch),
         **own_sizes,
