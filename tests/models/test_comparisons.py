@@ -33,6 +33,7 @@ from thermocomp.models.methods import METHODS
 from thermocomp.models.numerics import moments
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.pcr import PrincipalComponents
+from thermocomp.models.pcr_traversal import TraversedComponents
 from thermocomp.models.pls import PartialLeastSquares
 from thermocomp.models.ridge import Ridge
 from thermocomp.models.shrinkage import ShrunkRegressor, choose, scaling
@@ -41,7 +42,14 @@ from thermocomp.recordings.samples import Samples
 
 FloatArray = NDArray[np.float64]
 
-LINEAR: list[ShrunkRegressor] = [Ridge(), PrincipalComponents(), PartialLeastSquares(), Lasso(), ElasticNet()]
+LINEAR: list[ShrunkRegressor] = [
+    Ridge(),
+    PrincipalComponents(),
+    TraversedComponents(),
+    PartialLeastSquares(),
+    Lasso(),
+    ElasticNet(),
+]
 THROUGH_ZERO: list[ShrunkRegressor] = [type(e)(fit_intercept=False) for e in LINEAR]
 
 

@@ -91,9 +91,11 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
         for k in range(int(folds.max()) + 1):
             left_out = folds == k
             weights, intercepts = self._fitted(change[~left_out], deviation[~left_out])
-            residual = np.tensordot(weights, change[left_out], axes=(2, 1)) + intercepts[..., None]
-            residual -= deviation[left_out]
-            errors.append(np.sqrt(np.mean(residual**2, axis=2)))
+            # residuals are as long in the rows of the triangular factor, of which there are few
+            rows = np.column_stack([change[left_out], np.ones(left_out.sum()), deviation[left_out]])
+            *factor, ones, measured = np.linalg.qr(rows, mode="r").T
+            residual = weights @ np.array(factor) + intercepts[..., None] * ones - measured
+            errors.append(np.sqrt(np.sum(residual**2, axis=2) / len(rows)))
         rms = np.stack(errors, axis=-1)
         which, setting = choose(rms, self.rule)
         self.cv_rms_ = float(rms[which, setting].mean())

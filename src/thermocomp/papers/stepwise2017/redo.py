@@ -66,8 +66,8 @@ def _beats(c: Computed, other: str) -> Facts:
 
 @claims.facts
 def _bounded(c: Computed) -> Facts:
-    online, drift, little = c.errors[STEPWISE], c.errors[setup.NONE].max_abs, 2 * PAPERS_RESIDUAL
-    over = float(np.mean(np.abs(c.left[STEPWISE]) > PAPERS_RESIDUAL))
+    online, drift, little = c.on_dsp, c.errors[setup.NONE].max_abs, 2 * PAPERS_RESIDUAL
+    over = float(np.mean(np.abs(c.left_exported) > PAPERS_RESIDUAL))
     tiny = online.max_abs < PAPERS_RESIDUAL and drift < little
     return {"online": online, "drift": drift, "over": over, "little": little, "tiny": tiny}
 
