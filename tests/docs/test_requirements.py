@@ -9,7 +9,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 #: requirements per paper
-COUNTS = {"C": 36, "W": 13, "H": 18, "P": 7, "T": 10, "X": 3}
+COUNTS = {"C": 38, "W": 13, "H": 18, "P": 7, "T": 10, "X": 3}
+#: numbers that are not in use
+UNUSED = {"C-37"}
 GROUPS = tomllib.loads((ROOT / "docs" / "requirements.toml").read_text(encoding="utf-8"))
 ENTRIES = {key: entry for group in GROUPS.values() for key, entry in group.items() if key != "title"}
 
@@ -31,7 +33,8 @@ def claimed(study: str) -> frozenset[str]:
 
 
 def test_none_is_missing() -> None:
-    assert [*ENTRIES] == [f"{paper}-{k:02d}" for paper, n in COUNTS.items() for k in range(1, n + 1)]
+    numbered = [f"{paper}-{k:02d}" for paper, n in COUNTS.items() for k in range(1, n + 1)]
+    assert [*ENTRIES] == [key for key in numbered if key not in UNUSED]
 
 
 @pytest.mark.parametrize("key", ENTRIES)

@@ -9,7 +9,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.sir import NOISE_SHARE, SlicedInverse
+from thermocomp.models.sir import SlicedInverse
 from thermocomp.papers import common
 from thermocomp.virtual.datasets import record
 
@@ -25,7 +25,7 @@ def by_li(X: FloatArray, y: FloatArray, slices: int, directions: int) -> tuple[F
     """Return coefficients and intercept, step by step as in the paper of 1991 (section 5), on principal components."""
     covariance = np.cov(X.T, bias=True)
     values, axes = np.linalg.eigh(covariance)
-    kept = values > NOISE_SHARE * values.max()
+    kept = values > 1e-4 * values.max()  # the others are noise
     root = axes[:, kept] / np.sqrt(values[kept])
     white = (X - X.mean(axis=0)) @ root
     between = np.zeros((kept.sum(), kept.sum()))
