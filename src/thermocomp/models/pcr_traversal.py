@@ -1,14 +1,14 @@
 """`pcr-traversal`: principal component regression on the best of all small sets of temperatures."""
 
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb
 
 import numpy as np
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import FloatArray
-from thermocomp.models.shrinkage import ShrunkRegressor
+from thermocomp.models.shrinkage import ShrunkRegressor, choose
 
 #: largest number of sets of temperatures
 MOST_SETS = 20_000
@@ -22,13 +22,13 @@ class TraversedComponents(ShrunkRegressor):
 
     Every set of up to `max_points` temperatures is tried, each with every number of principal components, in order of
     variance. The paper that cites Miao et al. names the traversal, but neither its criterion nor the number of
-    components; here both set and number are chosen by cross-validation over thermal cycles: the set with the smallest
-    error, and of this set the number by `rule`.
+    components; here both set and number are chosen by cross-validation over thermal cycles: of each size the set with
+    the smallest error; among these the size by `rule`, and then the number of components by `rule`.
 
     Parameters
     ----------
     rule : {'one-standard-error', 'minimum'}
-        Rule for the choice of the number of components.
+        Rule for the choice of the number of temperatures and of components.
     fit_intercept : bool
         False: the model returns zero in the reference state, and the components are computed about zero.
     max_points : int
@@ -42,7 +42,7 @@ class TraversedComponents(ShrunkRegressor):
     selected_ : tuple of str
         Names of the chosen temperatures.
     cv_rms_, chosen_by_ : float, str
-        See `thermocomp.models.shrinkage.ShrunkRegressor`; `cv_rms_` is the smallest of all sets, so it is optimistic.
+        See `thermocomp.models.shrinkage.ShrunkRegressor`; `cv_rms_` is the smallest of many sets, so it is optimistic.
 
     Raises
     ------
@@ -87,6 +87,15 @@ class TraversedComponents(ShrunkRegressor):
                 weights[np.arange(len(sets))[:, None], k, sets] = path[:, :, min(k, size - 1)]
             found.append(weights)
         return np.concatenate(found)
+
+    def _choose(self, rms: FloatArray) -> tuple[int, int]:
+        ends = np.cumsum([0, *(comb(self.n_features_in_, size) for size in range(1, rms.shape[1] + 1))]).tolist()
+        least = rms.mean(axis=2).min(axis=1)
+        best = [begin + int(np.argmin(least[begin:end])) for begin, end in pairwise(ends)]
+        by_size = np.array([rms[which, rms[which].mean(axis=1).argmin()] for which in best])
+        _, size = choose(by_size[None], self.rule)
+        _, setting = choose(rms[best[size]][None], self.rule)
+        return best[size], setting
 
     def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - the set is seen from the coefficients
         self.n_components_ = setting + 1
