@@ -43,7 +43,7 @@ def test_it_finds_planted_temperatures() -> None:
 @pytest.mark.parametrize("rule", ["minimum", "one-standard-error"])
 @pytest.mark.parametrize(
     ("of", "size", "components"),
-    [((3.0, 0.0, 0.0, -2.0, 0.5), 2, 2), ((0, 3.0, 0, 0, 0), 1, 1), ((1, 1, 1, 1, 1), 3, 1)],
+    [((3.0, 0.0, 0.0, -2.0, 0.5), 2, 2), ((0, 3.0, 0, 0, 0), 1, 1), ((1.3, 1, 1, 0.7, 1), 3, 1)],
 )
 def test_as_by_plain_refits_of_every_set(rule: str, of: Sequence[float], size: int, components: int) -> None:
     """T-10: the same set, number of components and prediction as with scikit-learn, refitted without each cycle."""
