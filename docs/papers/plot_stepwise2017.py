@@ -56,7 +56,8 @@ assert 1 <= numbers["chosen"] < 24
 # -------
 #
 # Another day: the models run reading by reading, as they would at the machine, and are compared with the probe
-# measurement.
+# measurement. The paper ran its model on a DSP; here the selected model is exported to C, compiled and given the same
+# readings (without a C compiler: its Python twin). A test runs the same loop on an emulated Cortex-M7.
 
 draw("stepwise2017-fig6")
 print(page.text(study, "T-08", "T-10"))

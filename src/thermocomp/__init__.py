@@ -40,12 +40,14 @@ if TYPE_CHECKING:
     from thermocomp.models.ols import LeastSquares
     from thermocomp.models.partial_f import PartialF
     from thermocomp.models.pcr import PrincipalComponents
+    from thermocomp.models.pcr_traversal import TraversedComponents
     from thermocomp.models.pipelines import freeze
     from thermocomp.models.pls import PartialLeastSquares
     from thermocomp.models.ppr import ProjectionPursuit
     from thermocomp.models.ridge import Ridge
     from thermocomp.models.second_order import SecondOrderRegression
     from thermocomp.models.sensors import SensorSelector
+    from thermocomp.models.sir import SlicedInverse
     from thermocomp.models.subsets import BestSubset
     from thermocomp.nc.revise import revise
     from thermocomp.recordings.recording import Recording
@@ -108,6 +110,8 @@ _PUBLIC = {
     "SigmoidNet": "thermocomp.models.mlp",
     "SklearnNet": "thermocomp.models.mlp_sklearn",
     "SecondOrderRegression": "thermocomp.models.second_order",
+    "SlicedInverse": "thermocomp.models.sir",
+    "TraversedComponents": "thermocomp.models.pcr_traversal",
 }
 
 __all__ = [
@@ -141,8 +145,10 @@ __all__ = [
     "SensorSelector",
     "SigmoidNet",
     "SklearnNet",
+    "SlicedInverse",
     "Start",
     "ThermocompError",
+    "TraversedComponents",
     "__version__",
     "assess",
     "check",

@@ -21,6 +21,7 @@ from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.models.selection.maximal_correlation import maximal_correlations
+from thermocomp.models.sir import SlicedInverse
 
 #: class or function, parameter, printed value, requirement and place
 DEFAULTS: tuple[tuple[Callable[..., Any], str, object, str], ...] = (
@@ -64,6 +65,7 @@ DEFAULTS: tuple[tuple[Callable[..., Any], str, object, str], ...] = (
     (PartialF, "f_enter", 100.0, "T-03, section 3.2"),
     (PartialF, "f_delete", 50.0, "T-03, section 3.2"),
     (PartialF, "fit_intercept", True, "T-04, Eq. 2 has a constant"),
+    (SlicedInverse, "directions", 5, "T-10, introduction: Zhang, from 29 to 5"),
 )
 
 

@@ -112,7 +112,6 @@ PRINTED = (
     Printed("stepwise2017.setup.F_DELETE", 50, "T-03", "section 3.2"),
     Printed("stepwise2017.setup.PAPERS_COUNT", 5, "T-07", "abstract and section 3.2: from 24 to 5"),
     Printed("stepwise2017.setup.PAPERS_RESIDUAL", 5, "T-08", "abstract and section 4: less than 5 um"),
-    Printed("stepwise2017.setup.DIRECTIONS", 5, "T-10", "introduction: Zhang, from 29 to 5"),
 )
 
 #: criteria that stand for a word of a paper; how strict they are is our choice
@@ -158,7 +157,7 @@ OURS = {
     "precompensation.cutting": ("HOUR", "BEFORE", "BEFORE_SPEED", "ROOM", "OFTEN", "CASES", "TRIED", "HOUSE"),
     "precompensation.redo": ("BEYOND",),
     "precompensation.setup": ("BETWEEN", "GREATEST", "INTERVALS", "CUTS", "MILLING"),
-    "stepwise2017.setup": ("METHODS", "SLICES", "NOISE_SHARE", "THINNED"),
+    "stepwise2017.setup": ("METHODS", "THINNED"),
 }
 #: everything of the program that is milled, and of the way it is revised, is our own
 WHOLLY_OURS = ("precompensation.program",)

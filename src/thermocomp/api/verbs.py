@@ -57,7 +57,7 @@ def compare(
         Displacement channels to predict. Default: all of the first recording.
     models : str, estimator, or sequence of them
         Methods to compare, or ``all``: ols, partial-f, mra, averaged, dynamic, grouping, subsets, ace, ace-monotone,
-        mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pls, lasso, elastic-net, ppr, gp.
+        mlp, mlp-sklearn, arx, arx-free-run, arx-net, ridge, pcr, pcr-traversal, sir, pls, lasso, elastic-net, ppr, gp.
 
         In Python also estimators of any kind: an estimator of thermocomp with custom settings, any regressor of
         scikit-learn, a Pipeline, a custom class.

@@ -71,6 +71,13 @@ OWN = (
         "thermocomp.models.pcr:PrincipalComponents",
         takes=("cycle",),
     ),
+    Method(
+        "pcr-traversal",
+        "principal component regression on the best of all small sets of temperatures",
+        "thermocomp.models.pcr_traversal:TraversedComponents",
+        takes=("cycle",),
+    ),
+    Method("sir", "least squares on directions of sliced inverse regression", "thermocomp.models.sir:SlicedInverse"),
     Method("pls", "partial least squares", "thermocomp.models.pls:PartialLeastSquares", takes=("cycle",)),
     Method("lasso", "regression that also selects the temperatures", "thermocomp.models.lasso:Lasso", takes=("cycle",)),
     Method(

@@ -12,7 +12,7 @@ from scipy import linalg
 from thermocomp.core.exceptions import InputError
 from thermocomp.models.base import CycledRegressor, FloatArray, IntArray
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import Solution
+from thermocomp.models.numerics.leastsquares import Solution, join_columns, triangle
 
 Rule = Literal["one-standard-error", "minimum"]
 
@@ -91,15 +91,22 @@ class ShrunkRegressor(CycledRegressor, TermRegressor):
         for k in range(int(folds.max()) + 1):
             left_out = folds == k
             weights, intercepts = self._fitted(change[~left_out], deviation[~left_out])
-            residual = np.tensordot(weights, change[left_out], axes=(2, 1)) + intercepts[..., None]
-            residual -= deviation[left_out]
-            errors.append(np.sqrt(np.mean(residual**2, axis=2)))
+            # residuals are as long in the rows of the triangular factor, of which there are few
+            n = int(left_out.sum())
+            rows = join_columns(np.column_stack([change[left_out], np.ones(n)]), deviation[left_out])
+            *short, ones, measured = triangle(rows, intercept=False).factor.T
+            residual = weights @ np.array(short) + intercepts[..., None] * ones - measured
+            errors.append(np.sqrt(np.sum(residual**2, axis=2) / n))
         rms = np.stack(errors, axis=-1)
-        which, setting = choose(rms, self.rule)
+        which, setting = self._choose(rms)
         self.cv_rms_ = float(rms[which, setting].mean())
         weights, intercepts = self._fitted(change, deviation)
         self._note(which, setting)
         self._conclude(change, deviation, weights[which, setting], float(intercepts[which, setting]))
+
+    def _choose(self, rms: FloatArray) -> tuple[int, int]:
+        """Return the set and the setting chosen by the errors on the left-out folds; see `choose`."""
+        return choose(rms, self.rule)
 
     @abstractmethod
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:

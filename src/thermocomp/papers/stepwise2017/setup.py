@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.robustness import Robustness, stress
-from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
+from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.numerics.stepwise import r_squared_of_f
 from thermocomp.models.partial_f import PartialF
 from thermocomp.papers import common
+from thermocomp.papers.exported import predict_exported
 from thermocomp.papers.study import FloatArray, Progress
 from thermocomp.recordings.samples import Samples
 from thermocomp.virtual.datasets import record
@@ -28,15 +28,13 @@ METHODS = {
     "least squares, all temperatures": "ols",
     "projection pursuit": "ppr",
     "principal components": "pcr",
-    "sliced inverse regression": "",
+    "principal components, points traversed": "pcr-traversal",
+    "sliced inverse regression": "sir",
     "dynamic (not in the paper)": "dynamic",
+    "averaged (recommended, not in the paper)": "averaged",
 }
-STEPWISE, LEAST, PURSUIT, COMPONENTS, SLICED, DYNAMIC = METHODS
+STEPWISE, LEAST, PURSUIT, COMPONENTS, TRAVERSED, SLICED, DYNAMIC, AVERAGED = METHODS
 NONE = "no compensation"
-#: number of slices of the deviation, and of directions kept: as many as the sensors kept by Zhang et al.
-SLICES, DIRECTIONS = 10, 5
-#: share of the largest variance below which a principal direction of the temperatures is noise
-NOISE_SHARE = 1e-4
 #: row intervals for the effect of the number of rows on the F thresholds (E-T3)
 THINNED = (1, 2, 4, 8, 16)
 
@@ -76,8 +74,12 @@ class Computed:
         Models by the names of `METHODS`.
     absolute : float
         RMS of the stepwise model with absolute temperatures in the on-line test [um].
+    exported : ndarray of shape (n_rows,)
+        Deviation that the exported program of the stepwise model predicts in the on-line test [um].
+    exported_by : str
+        What ran the exported program.
     shaken : dict of str to Robustness
-        Stepwise and the two compared methods in the on-line test with noise and lost sensors.
+        Stepwise, the two compared methods and ours in the on-line test with noise and lost sensors.
     """
 
     fit: Samples
@@ -86,6 +88,8 @@ class Computed:
     models: dict[str, ErrorModel]
     thinned: tuple[Thinned, ...]
     absolute: float
+    exported: FloatArray
+    exported_by: str
     shaken: dict[str, Robustness]
 
     @cached_property
@@ -102,6 +106,16 @@ class Computed:
     def errors(self) -> dict[str, common.Errors]:
         """Error metrics of each model in the on-line test."""
         return {name: common.Errors.of(e) for name, e in self.left.items()}
+
+    @cached_property
+    def left_exported(self) -> FloatArray:
+        """Residual of the exported program in the on-line test [um]."""
+        return self.online.deviations[:, 0] - self.exported
+
+    @cached_property
+    def on_dsp(self) -> common.Errors:
+        """Error metrics of the exported program in the on-line test."""
+        return common.Errors.of(self.left_exported)
 
     @property
     def fitted(self) -> common.Errors:
@@ -131,47 +145,29 @@ def compute(seed: int, progress: Progress) -> Computed:
     models = common.fit_and_freeze(selection, warm, [TARGET])
     found = {STEPWISE: models[TARGET]}
     for k, (name, method) in enumerate(METHODS.items()):
-        progress(0.2 + 0.1 * k, name)
-        if method and name not in found:
+        progress(0.2 + 0.07 * k, name)
+        if name not in found:
             found[name] = common.trained(method, learn, support=common.PAPERS_SUPPORT)
-    found[SLICED] = sliced_inverse(warm)
     progress(0.8, "noise and lost sensors")
     measured = judge.deviations[:, 0]
-    shaken = {m: stress(found[m], judge, measured, common.every(judge)).robustness for m in (STEPWISE, LEAST, PURSUIT)}
+    stressed = (STEPWISE, LEAST, PURSUIT, AVERAGED)
+    shaken = {m: stress(found[m], judge, measured, common.every(judge)).robustness for m in stressed}
     progress(0.95, "fewer rows")
     thinned = tuple(_thinned(warm, now, step) for step in THINNED)
     raw, new = (common.stacked([r], [TARGET], heat, rezero=False) for r in (test, online))
     absolute = common.fit_and_freeze(PartialF(f_enter=F_ENTER, f_delete=F_DELETE), raw, [TARGET])[TARGET]
+    exported, exported_by = predict_exported(found[STEPWISE], judge)
     return Computed(
         fit=learn,
         online=judge,
         selection=selection,
-        models={name: found[name] for name in METHODS},
+        models=found,
         thinned=thinned,
         absolute=common.rms(measured - common.predict_deviation(absolute, new)),
+        exported=exported,
+        exported_by=exported_by,
         shaken=shaken,
     )
-
-
-def sliced_inverse(samples: Samples) -> ErrorModel:
-    """Fit least squares on the first directions of sliced inverse regression (Li 1991), the method of Zhang (T-10).
-
-    Rows are sorted by deviation and divided into slices; the deviation depends on the directions in which the whitened
-    mean temperatures of the slices differ most. Principal directions that consist of noise are removed first, because
-    whitening would scale them up to the size of the others.
-    """
-    X, y = samples.change(), samples.deviations[:, 0]
-    centred = X - X.mean(axis=0)
-    _, size, axes = linalg.svd(centred, full_matrices=False)
-    kept = size**2 > NOISE_SHARE * size[0] ** 2
-    whitening = axes[kept].T / size[kept] * np.sqrt(len(y))
-    white = centred @ whitening
-    slices = np.array_split(np.argsort(y, kind="stable"), SLICES)
-    between = sum(len(s) / len(y) * np.outer(white[s].mean(axis=0), white[s].mean(axis=0)) for s in slices)
-    _, directions = linalg.eigh(between)
-    onto = whitening @ directions[:, ::-1][:, :DIRECTIONS]
-    solved = lstsq(X @ onto, y)
-    return common.frozen(samples, range(X.shape[1]), (onto @ solved.coefficients).tolist(), solved.intercept)
 
 
 def _thinned(warm: Samples, online: Samples, step: int) -> Thinned:
