@@ -50,9 +50,9 @@ GRIP = Fit(
     behind=1200.0,
     conductivity=55.0,
 )
-#: The grip of each mounting of the tool (W-10), engineering values; the shape of the chuck remains that of the hydraulic
-#: one. Shrink: steel on carbide without oil, a thinner wall, 0.025 mm in diameter, which agrees with some 530 N m.
-#: Collet ER32: clamped over 40 mm, some 190 N m, and a slotted collet in a cone of 3000 W/(m2 K) behind.
+#: The grip of each mounting of the tool (W-10), engineering values; the shape of the chuck remains that of the
+#: hydraulic one. Shrink: steel on carbide without oil, a thinner wall, 0.025 mm in diameter, which agrees with some
+#: 530 N m. Collet ER32: clamped over 40 mm, some 190 N m, and a slotted collet in a cone of 3000 W/(m2 K) behind.
 MOUNTINGS: Mapping[str, Fit] = {
     "hydraulic": GRIP,
     "shrink": replace(GRIP, squeeze=12.5, outside=19.0, behind=math.inf),

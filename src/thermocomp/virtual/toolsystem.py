@@ -14,8 +14,8 @@ from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
-#: heat sources, and their shares of the inputs of the reduced model: heating elements at the bearing fit, hot-air gun at
-#: the cutting edges, half of whose air flows along the tool (an engineering value), soldering iron at the tip
+#: heat sources, and their shares of the inputs of the reduced model: heating elements at the bearing fit, hot-air gun
+#: at the cutting edges, half of whose air flows along the tool (an engineering value), soldering iron at the tip
 SOURCES: Mapping[str, Mapping[str, float]] = {
     "heater": {"heater": 1.0},
     "hot_air": {"tip": 0.5, "on_tool": 0.5},

@@ -16,6 +16,7 @@ from thermocomp.papers.study import Figure, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
+    FROM_START,
     MLR_NAME,
     SWEEPS,
     MillingTrial,
@@ -125,7 +126,9 @@ def _better_at_rest(r: Resting, sets: str) -> Facts:
 
 @milling.facts
 def _better_at_work(found: MillingTrial) -> Facts:
-    return _better(found, range(len(found.learned.inputs)))
+    start = {m: found.estimates.get(FROM_START.format(m)) for m in (MLR_NAME, ACE_NAME)}
+    given = {m: rms(found.measured - estimate) for m, estimate in start.items() if estimate is not None}
+    return _better(found, range(len(found.learned.inputs))) | {"zeros": bool(given), "start": given}
 
 
 @resting.facts
@@ -135,7 +138,7 @@ def _locally(r: Resting) -> Facts:
     linear, ace = r.own.residual(MLR_NAME), r.own.residual(ACE_NAME)
     gains = [rms(linear[p]) / max(rms(ace[p]), 1e-9) for p in parts]
     best = int(np.argmax(gains))
-    facts = {"gains": gains, "gain": gains[best], "total": rms(linear) / rms(ace)}
+    facts = r.own.reasons() | {"gains": gains, "gain": gains[best], "total": rms(linear) / rms(ace)}
     return facts | {"first": parts[best][0] + 1, "last": parts[best][-1] + 1}
 
 
