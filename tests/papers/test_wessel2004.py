@@ -38,6 +38,8 @@ from thermocomp.virtual.protocol import Physics
 FloatArray = NDArray[np.float64]
 #: the modules that record experiments
 MODULES = (wessel2004_spindle, wessel2004_sets, wessel2004_tools, wessel2004_transfer)
+#: errors of the paper's set of temperatures on the resting tool
+OWN_SET = [f"paper_set_{m}_rms_um" for m in ("mlr", "ace", "averaged")]
 
 
 def table(name: str, temperatures: FloatArray, displacements: FloatArray, dt: float = 100.0) -> Recording:
@@ -178,6 +180,22 @@ def test_days_of_other_temperature_are_also_counted_from_their_start(study: tupl
     (fem,) = [t for t in study[0].tables if t.caption.startswith("Finite")]
     assert FROM_START.format(ACE_NAME) in [row[1] for row in milling.rows]
     assert FROM_START.format(ACE_NAME) not in [row[1] for row in fem.rows]
+
+
+def test_models_are_exchanged_between_mountings(study: tuple[Study, list[float]]) -> None:
+    """W-14: the diagonal is the study of the tool at rest; others by least squares in numpy."""
+    found, n = study[0], study[0].numbers
+    (table,) = [t for t in found.tables if t.caption.startswith("RMS of S1")]
+    mountings = ["hydraulic", "shrink", "collet"]
+    assert [tuple(row[:2]) for row in table.rows] == [(a, b) for a in mountings for b in mountings]
+    own = [f"{n[f'tool_{name}']:.2f}" for name in ("none_rms_um", *OWN_SET)]
+    assert table.rows[0][2:] == own
+    learned, unseen = (stand_in("wessel-tool", mounting=m)[k] for m, k in (("shrink", 0), ("collet", 1)))
+    A, B = (np.column_stack([r.values(r.temperatures)[:, [0, 1, 7]], np.ones(len(r))]) for r in (learned, unseen))
+    y, measured = (r.values(r.displacements)[:, 0] - r.values(r.displacements)[0, 0] for r in (learned, unseen))
+    linear = np.sqrt(np.mean((measured - B @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
+    assert float(table.rows[5][3]) == pytest.approx(linear, abs=0.006)
+    assert float(table.rows[5][2]) == pytest.approx(np.sqrt(np.mean(measured**2)), abs=0.006)
 
 
 @pytest.mark.usefixtures("experiments")

@@ -126,9 +126,9 @@ def _better_at_rest(r: Resting, sets: str) -> Facts:
 
 @milling.facts
 def _better_at_work(found: MillingTrial) -> Facts:
-    start = {m: found.estimates.get(FROM_START.format(m)) for m in (MLR_NAME, ACE_NAME)}
-    given = {m: rms(found.measured - estimate) for m, estimate in start.items() if estimate is not None}
-    return _better(found, range(len(found.learned.inputs))) | {"zeros": bool(given), "start": given}
+    zeros = [FROM_START.format(m) for m in (MLR_NAME, ACE_NAME)]
+    start = [rms(found.measured - found.estimates[m]) for m in zeros if m in found.estimates]
+    return _better(found, range(len(found.learned.inputs))) | {"zeros": bool(start), "start": start}
 
 
 @resting.facts
