@@ -159,10 +159,11 @@ def test_wessels_gain_over_linear_regression(entry: str, printed: float, relativ
 def test_a_machine_without_nonlinearity_tests_no_ace() -> None:
     """W-01, W-09: ACE must at least fit the training data more closely than linear regression."""
     for fit, verdict in ((0.59, "yes"), (0.6, "not testable")):
-        (claim,) = tools.milling.judged("better_at_work", Trial(mlr=9.0, fit=fit))
+        trial: Any = Trial(mlr=9.0, fit=fit)
+        (claim,) = tools.milling.judged("better_at_work", trial)
         assert claim.verdict == verdict
-    trial: Any = Trial(mlr=9.0, fit=0.6)
-    (bent,) = spindle.claims.judged("bent", SimpleNamespace(found=trial))
+    found: Any = SimpleNamespace(found=trial)
+    (bent,) = spindle.claims.judged("bent", found)
     assert bent.verdict == "not testable"
     assert "in the training data, too" in bent.finding.lower()
 
@@ -192,7 +193,7 @@ def test_one_temperature_that_is_enough_tests_no_triple(single: float, verdict: 
 def test_a_model_is_used_with_another_mounting(transferred: float, own: float, verdict: str) -> None:
     """W-14: a fifth of the error without compensation, twice that of the mounting's own model."""
     none = 10.05 if verdict == "in part" else 10.0
-    errors = {pair: {"none": none, "ace": own if pair[0] == pair[1] else 1.0} for pair in product("abc", repeat=2)}
+    errors = {(a, b): {"none": none, "ace": own if a == b else 1.0} for a, b in product("abc", repeat=2)}
     errors["a", "c"]["ace"] = transferred
     (claim,) = transfer.claims.judged("transferred", transfer.Transfer(errors))
     assert claim.verdict == verdict
