@@ -78,9 +78,9 @@ assert numbers["fem_dynamic_rms_um"] < numbers["fem_ace_rms_um"]
 # Which temperatures?
 # -------------------
 #
-# Nine temperature sensors on the heated tool, 23 data sets in three mountings, three displacements: 35 259 models, which were too many in
-# 2004. Each set of temperatures gets a maximal correlation on each data set; sets that the Wilcoxon test for paired
-# samples cannot distinguish from the best are equivalent.
+# Nine temperature sensors on the heated tool, 23 data sets in three mountings, three displacements: 35 259 models, too
+# many in 2004. Each set of temperatures gets a maximal correlation on each data set; sets that the Wilcoxon test for
+# paired samples cannot distinguish from the best are equivalent.
 
 print(page.text(study, "W-10", "W-11", "W-12"))
 show(2, 3)
@@ -92,8 +92,8 @@ assert numbers["sets_best_psi"] > 0.99
 # The heated tool at rest
 # -----------------------
 #
-# The tool is heated at the bearing fit, by a hot-air gun and by a soldering iron, one apart from the other; because of a
-# break, the training data includes the fast warm-up twice. Figs. 5 and 6:
+# The tool is heated at the bearing fit, by a hot-air gun and by a soldering iron, separately; because of a break, the
+# training data includes the fast warm-up twice. Figs. 5 and 6:
 
 draw("fig5")
 draw("fig6")

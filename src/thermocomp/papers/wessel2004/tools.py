@@ -16,6 +16,7 @@ from thermocomp.papers.study import Figure, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
+    AVERAGED,
     FROM_START,
     MLR_NAME,
     SWEEPS,
@@ -221,7 +222,7 @@ def _sets_table(r: Resting) -> StudyTable:
 def _estimated(found: MillingTrial) -> list[Panel]:
     shown, x = (MLR_NAME, ACE_NAME), points(found.unseen)
     above = {"measured": found.measured} | {m: found.estimates[m] for m in shown}
-    below = {m: found.residual(m) for m in (*shown, "dynamic")}
+    below = {m: found.residual(m) for m in (*shown, AVERAGED)}
     return [
         Panel("", "measuring point", f"{place(found.target)} [um]", curves(x, above, dashed=shown)),
         Panel("", "measuring point", "measured - estimated [um]", curves(x, below)),
