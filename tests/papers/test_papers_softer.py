@@ -193,8 +193,8 @@ def test_one_temperature_that_is_enough_tests_no_triple(single: float, verdict: 
 def test_a_model_is_used_with_another_mounting(transferred: float, own: float, verdict: str) -> None:
     """W-14: a fifth of the error without compensation, twice that of the mounting's own model."""
     none = 10.05 if verdict == "in part" else 10.0
-    errors = {(a, b): {"none": none, "ace": 1.0 if a != b else own if a == "c" else 9.0} for a, b in product("abc", repeat=2)}
-    errors["a", "c"]["ace"] = transferred
+    errors = {(a, b): {"none": none, "ace": 9.0 if a == b else 1.0} for a, b in product("abc", repeat=2)}
+    errors["a", "c"]["ace"], errors["c", "c"]["ace"] = transferred, own
     (claim,) = transfer.claims.judged("transferred", transfer.Transfer(errors))
     assert claim.verdict == verdict
     assert claim.ours.startswith(f"worst a to c: {none:.1f} -> {transferred:.2f} um")

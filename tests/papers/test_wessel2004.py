@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermocomp.core.machine import Channel
 from thermocomp.models.selection.equivalents import equivalents
 from thermocomp.models.selection.maximal_correlation import MaximalCorrelations
+from thermocomp.papers.common import residual, rms, trained
 from thermocomp.papers.study import Claim, Study
 from thermocomp.papers.wessel2004 import redo as wessel2004
 from thermocomp.papers.wessel2004 import sets as wessel2004_sets
@@ -84,9 +85,8 @@ def schedule(name: str, rows: int, pieces: int) -> FloatArray:
 
 
 def stand_in(experiment: str, *, physics: str | None = None, mounting: str = "", seed: int = 0) -> list[Recording]:
-    """Return the experiments of the study on the rod, which has one physics; another mounting: another room."""
+    """Return the experiments of the study on the rod, which has one physics; another mounting: heated otherwise."""
     assert physics is None
-    mounted = {"shrink": 0.5, "collet": 1.0}.get(mounting, 0.0)
 
     def rod(name: str, rows: int, pieces: int, n_t: int = 9, n_s: int = 3, room: float = 20.0) -> Recording:
         return heated_rod(name, schedule(f"{seed} {name}", rows, pieces), n_t=n_t, n_s=n_s, room=room)
@@ -94,7 +94,7 @@ def stand_in(experiment: str, *, physics: str | None = None, mounting: str = "",
     if experiment == "wessel-fem":
         return [rod(n, 199, 6, 3, 2) for n in ("reference", "test")]
     if experiment == "wessel-tool":
-        return [rod(n, 240, 5, room=20.0 + mounted) for n in ("training", "test")]
+        return [rod(n + mounting.removeprefix("hydraulic"), 240, 5) for n in ("training", "test")]
     if experiment == "wessel-milling":
         return [rod(f"day{k}", 80, 5, 3, 1, room=19.0 + k) for k in range(1, 6)]
     return [rod(f"set{k}", 100, 4) for k in range(23)]
@@ -196,6 +196,9 @@ def test_models_are_exchanged_between_mountings(study: tuple[Study, list[float]]
     linear = np.sqrt(np.mean((measured - B @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2))
     assert float(table.rows[5][3]) == pytest.approx(linear, abs=0.006)
     assert float(table.rows[5][2]) == pytest.approx(np.sqrt(np.mean(measured**2)), abs=0.006)
+    samples = [stacked([r], 0, (0, 1, 7), rezero=True) for r in (learned, unseen)]
+    averaged = trained("averaged", samples[0])
+    assert float(table.rows[5][5]) == pytest.approx(rms(residual(averaged, samples[1])), abs=0.006)
 
 
 @pytest.mark.usefixtures("experiments")
