@@ -30,7 +30,8 @@ def errors(shared_data: Path, every: int, methods: Sequence[str], channels: str)
 
 def printed() -> dict[str, list[float]]:
     """Return the table of the page."""
-    rows = re.findall(r"\* - ``?(none|[a-z-]+)``?\n((?:     - [\d.]+\n){5})", PAGE.read_text(encoding="utf-8"))
+    text = PAGE.read_text(encoding="utf-8").partition("RMS in the unseen cycles [um]")[2]
+    rows = re.findall(r"\* - `*(?!method)([a-z-]+)`*\n((?:     - [\d.]+\n){5})", text)
     return {name: [float(c) for c in re.findall(r"[\d.]+", cells)] for name, cells in rows}
 
 
@@ -45,7 +46,7 @@ def test_the_methods_on_a_measured_machine(shared_data: Path) -> None:
 
 @pytest.mark.long
 def test_the_page_tells_the_errors_of_a_measured_machine(shared_data: Path) -> None:
-    found, told = errors(shared_data, 1, METHODS, "12345"), printed()
+    told = printed()
     assert [*told] == ["none", *METHODS]
-    for method, rms in found.items():
+    for method, rms in errors(shared_data, 1, METHODS, "12345").items():
         assert told[method] == pytest.approx(rms, abs=0.051), method
