@@ -13,6 +13,7 @@ from finite_elements.part import Part
 from finite_elements.revolution import Revolution, with_joints
 from finite_elements.toolholder import toolholder
 from finite_elements.transient import Stepper
+from thermocomp.virtual.toolsystem import FOOT
 
 FloatArray = NDArray[np.float64]
 
@@ -42,6 +43,7 @@ def test_it_has_the_papers_places(part: Part) -> None:
 def test_the_air_is_taken_where_the_surface_is(part: Part) -> None:
     middle = {name: s.height.sum() / s.area + 1.2 for name, s in part.surfaces.items()}
     assert middle["foot"] == pytest.approx(1.0, abs=1e-9)
+    assert data("tool.toml")["film"]["foot"] * part.surfaces["foot"].area == pytest.approx(FOOT, rel=1e-9)  # W-15
     assert 1.39 < middle["tool"] < 1.5
     assert middle["body"] < middle["shaft"] < middle["chuck"] < middle["tool"]
 

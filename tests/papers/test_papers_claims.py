@@ -10,6 +10,8 @@ import pytest
 
 from thermocomp.papers.claims import Claims, Facts
 from thermocomp.papers.sentences import Sentences
+from thermocomp.papers.studies import _known
+from thermocomp.papers.study import Claim
 
 FILE = """
 [parts]
@@ -47,6 +49,15 @@ ours = "{times:g}"
 holds = "times > ONE"
 softer = "A figure only."
 
+[study.presupposed]
+ids = "W-08"
+text = "Better"
+ours = "{times:g}"
+holds = "times > ONE"
+premise = "error <= LIMIT"
+untestable = "An error of {error:g} um leaves nothing to compare."
+otherwise = "It is not."
+
 [study.told]
 ids = "C-35"
 text = "Verdict of the facts"
@@ -76,13 +87,41 @@ def test_a_claim_is_judged_by_its_criterion_or_its_facts(study: ModuleType) -> N
     def _told(found: SimpleNamespace) -> Facts:
         return {"word": "so", "holds": np.bool_(found.cold < 1)}
 
-    cold, warm, rows, *_, told = claims(SimpleNamespace(cold=0.5, rows=[1, 2, 3], both=True, times=1.5))
+    cold, warm, rows, *_, told = claims(SimpleNamespace(cold=0.5, rows=[1, 2, 3], both=True, times=1.5, error=2.0))
     assert (cold.ids, cold.text, cold.paper, cold.ours) == (("C-34", "C-36"), "It is small, cold", "1 um", "0.5 um")
     assert (cold.holds, cold.finding) == (True, "Of ten rows.")
     assert (warm.holds, warm.finding) == (False, "Of ten rows. The rest is noise.")
     assert (rows.ours, rows.holds, rows.finding) == ("3, shared by 1 claims", None, "")
     assert told.holds is True
     assert claims.judged("rows", SimpleNamespace(rows=[], both=False))[0].ours == "0, "
+
+
+@pytest.mark.parametrize(
+    ("error", "times", "verdict"),
+    [(1.0, 1.5, "yes"), (1.0, 0.5, "no"), (1.1, 1.5, "not testable"), (1.1, 0.5, "not testable")],
+)
+def test_a_claim_without_its_premise_is_not_testable(
+    study: ModuleType, error: float, times: float, verdict: str
+) -> None:
+    found = SimpleNamespace(error=error, times=times)
+    claims = Claims[SimpleNamespace](study.__name__)
+    (claim,) = claims.judged("presupposed", found)
+    assert claim.verdict == verdict
+    reasons = {"yes": "", "no": "It is not.", "not testable": "An error of 1.1 um leaves nothing to compare."}
+    assert claim.finding == reasons[verdict]
+    assert (claim.holds, claim.testable) == ({"yes": True, "no": False}.get(verdict), verdict != "not testable")
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0)])
+def test_a_claim_that_one_run_cannot_test_is_not_testable(order: tuple[int, ...]) -> None:
+    runs = [
+        Claim(("W-08",), "Better", "", "1", None, "Nothing to compare.", testable=False),
+        Claim(("W-08",), "Better", "", "1", True),
+        Claim(("W-08",), "Better", "", "1", False, "It is not."),
+    ]
+    joined = _known(runs[order[0]], [[runs[k]] for k in order[1:]], seed=0)
+    assert (joined.verdict, joined.holds) == ("not testable", None)
+    assert "Nothing to compare." in joined.finding
 
 
 @pytest.mark.parametrize(

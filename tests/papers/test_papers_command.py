@@ -88,6 +88,7 @@ def test_some_for_programs(asked: list[tuple[str, int]], capsys: pytest.CaptureF
         "finding": "",
         "again": [True, True],
         "softer": False,
+        "testable": True,
     }
     assert second["holds"] is False
     assert numbers == {"rms_um": 1.25, "unknown_um": None}

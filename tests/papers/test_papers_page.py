@@ -55,6 +55,13 @@ def test_a_study_whose_claims_all_hold_is_green(study: Study) -> None:
     assert papers.headline(part) == "1 of 2 claims hold on the virtual machine, 1 in part"
     assert 'class="verdict good"' not in papers.render([part], seed=0)
     assert "holds: in part. Half in the paper." in papers.text(part)
+    none = replace(CLAIMS[0], holds=None, finding="Nothing to compare.", testable=False)
+    untested = replace(study, claims=(CLAIMS[0], none))
+    assert papers.headline(untested) == "1 of 2 claims hold on the virtual machine, 1 not testable on it"
+    assert 'class="verdict good"' not in papers.render([untested], seed=0)
+    assert "holds: not testable. Nothing to compare." in papers.text(untested)
+    with pytest.raises(ValueError, match="needs a finding"):
+        replace(none, finding="")
 
 
 def test_plain_text(study: Study) -> None:

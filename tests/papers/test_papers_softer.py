@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from thermocomp.papers.chen1996 import drift, slope, unseen
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.study import Claim
-from thermocomp.papers.wessel2004 import sets, tools
+from thermocomp.papers.wessel2004 import sets, spindle, tools, transfer
+from thermocomp.papers.wessel2004.trial import ACE_NAME, FROM_START, MLR_NAME
 
 
 def regressions(**each: dict[str, Any]) -> dict[str, SimpleNamespace]:
@@ -125,13 +127,16 @@ def test_sensors_left_by_stepwise(chosen: int, verdict: str) -> None:
 
 
 class Trial(SimpleNamespace):
-    """Errors of linear regression and ACE, and no reasons."""
+    """Errors of linear regression and ACE, and no reasons; in training ACE is better by default."""
 
     measured = np.ones(3)
     learned = SimpleNamespace(inputs=range(3))
+    fit = 0.5
+    estimates: ClassVar[dict[str, Any]] = {}
 
     def reasons(self) -> dict[str, Any]:
-        return {"mlr": self.mlr, "ace_rms": 1.0, "reasons": False}
+        facts = {"mlr": self.mlr, "ace_rms": 1.0, "fit": self.fit, "fit_mlr": 0.6, "correlation": 0.99}
+        return facts | {"reasons": False, "linear": True, "straightness": True}
 
     def rms_beside(self, *_: str) -> dict[str, float]:
         return {}
@@ -140,13 +145,59 @@ class Trial(SimpleNamespace):
 @pytest.mark.parametrize(("entry", "printed"), [("better_at_rest", 5.7), ("better_at_work", 5.0 / 2.2)])
 @pytest.mark.parametrize(("relative", "verdict"), [(1.01, "yes"), (0.99, "in part"), (0.0, "no")])
 def test_wessels_gain_over_linear_regression(entry: str, printed: float, relative: float, verdict: str) -> None:
-    """W-08, W-09."""
+    """W-08, W-09. Where linear regression is better, the virtual tool cannot test ACE; the virtual machine can."""
+    if verdict == "no" and "rest" in entry:
+        verdict = "not testable"
     trial: Any = Trial(mlr=max(relative * printed, 0.9))
     of: Callable[..., list[Claim]] = tools.resting.judged if "rest" in entry else tools.milling.judged
     found = (
         SimpleNamespace(paper=trial, own=trial, selection=SimpleNamespace(chosen=(0, 1))) if "rest" in entry else trial
     )
     assert {c.verdict for c in of(entry, found)} == {verdict}
+
+
+def test_a_machine_without_nonlinearity_tests_no_ace() -> None:
+    """W-01, W-09: ACE must at least fit the training data more closely than linear regression."""
+    for fit, verdict in ((0.59, "yes"), (0.6, "not testable")):
+        trial: Any = Trial(mlr=9.0, fit=fit)
+        (claim,) = tools.milling.judged("better_at_work", trial)
+        assert claim.verdict == verdict
+    found: Any = SimpleNamespace(found=trial)
+    (bent,) = spindle.claims.judged("bent", found)
+    assert bent.verdict == "not testable"
+    assert "in the training data, too" in bent.finding.lower()
+
+
+def test_both_zeros_of_the_milling_machine_are_shown() -> None:
+    """W-09: the verdict is that of absolute temperatures, as in the paper."""
+    ace, linear = (FROM_START.format(m) for m in (ACE_NAME, MLR_NAME))
+    trial: Any = Trial(mlr=0.9, estimates={ace: np.full(3, 0.5), linear: np.full(3, -1.0)})
+    (claim,) = tools.milling.judged("better_at_work", trial)
+    assert claim.verdict == "no"
+    assert claim.ours.startswith("absolute temperatures: MLR 0.90 um, ACE 1.00 um")
+    assert claim.ours.endswith("; temperatures from each start: MLR 2.00 um, ACE 0.50 um")
+
+
+@pytest.mark.parametrize(("single", "verdict"), [(0.99, "yes"), (0.991, "not testable")])
+def test_one_temperature_that_is_enough_tests_no_triple(single: float, verdict: str) -> None:
+    """W-12."""
+    by_size = {1: np.array([single, 0.995]), 2: np.array([0.995, 0.995]), 3: np.array([0.999, 0.999])}
+    found: Any = SimpleNamespace(by_size=by_size)
+    (claim,) = sets.claims.judged("enough", found)
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("transferred", "own", "verdict"), [(2.0, 1.0, "yes"), (2.01, 1.0, "in part"), (2.01, 0.5, "no")]
+)
+def test_a_model_is_used_with_another_mounting(transferred: float, own: float, verdict: str) -> None:
+    """W-14: a fifth of the error without compensation, twice that of the mounting's own model."""
+    none = 10.05 if verdict == "in part" else 10.0
+    errors = {(a, b): {"none": none, "ace": 9.0 if a == b else 1.0} for a, b in product("abc", repeat=2)}
+    errors["a", "c"]["ace"], errors["c", "c"]["ace"] = transferred, own
+    (claim,) = transfer.claims.judged("transferred", transfer.Transfer(errors))
+    assert claim.verdict == verdict
+    assert claim.ours.startswith(f"worst a to c: {none:.1f} -> {transferred:.2f} um")
 
 
 @pytest.mark.parametrize(

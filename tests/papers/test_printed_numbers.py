@@ -126,6 +126,8 @@ CRITERIA = (
     Printed("wessel2004.trial.SLIGHT", 0.01, "W-05", "only slight differences"),
     Printed("wessel2004.tools.FEW", 0.05, "W-08", "a sufficient range of values"),
     Printed("wessel2004.tools.WINDOW", 0.05, "W-04 E-W8", "N = 10 of n = 199"),
+    Printed("wessel2004.transfer.SHARE", 0.2, "W-14", "may be immediately transferred"),
+    Printed("wessel2004.transfer.TWICE", 2, "W-14", "may be immediately transferred: without a loss"),
     Printed("hwang.setup.SAME", 1.1, "H-13", "nearly the same level"),
     Printed("precompensation.redo.WELL", 0.9, "P-05", "can describe thermal errors well"),
     Printed("precompensation.redo.AS_WELL", 1.1, "P-04", "the errors at any z can be obtained"),

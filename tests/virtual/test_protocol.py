@@ -168,6 +168,7 @@ def test_the_soak_hears_nothing_of_the_test() -> None:
         ({"soak": Stretch(speed=100.0)}, ("soak", "duration"), "missing"),
         ({"copies": 0}, ("copies",), "expected 1 to 10000 copies, found 0"),
         ({"weight": 2.0}, ("weight",), "applies only"),
+        ({"foundation": -31.0}, ("foundation",), "from -30 to 30"),
     ],
 )
 def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | int, ...], message: str) -> None:
@@ -192,6 +193,9 @@ def test_an_impossible_test_is_refused(wrong: dict[str, Any], path: tuple[str | 
         ),
         ({"speed": 100.0}, "tool", ("speed",), "no spindle"),
         ({"feed": Feed(x=1.0)}, "tool", ("feed",), "no axes"),
+        ({"mounting": "shrunk"}, "tool", ("mounting",), "nearest are shrink"),
+        ({"mounting": "shrink"}, "centre", ("mounting",), "only the resting tool"),
+        ({"foundation": 2.0}, "centre", ("foundation",), "only the resting tool"),
         ({"faults": (SensorFault("t_hosing_C", "lost", 0.0),)}, "centre", ("faults", 0, "channel"), "t_housing_C"),
         ({}, "lathe", ("machine",), "there are centre, tool"),
     ],

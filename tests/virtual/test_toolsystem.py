@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.virtual.machine import Air, FeedDrive, Truth, VirtualMachine
+from thermocomp.virtual.nonlinear import MOUNTINGS, NonlinearTool
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE
-from thermocomp.virtual.toolsystem import RestingTool, ToolState
+from thermocomp.virtual.toolsystem import FOOT, STICTION, RestingTool, ToolState
 
 FloatArray = NDArray[np.float64]
 AIR = Air(20.0)
@@ -126,7 +127,7 @@ def test_a_warm_start_has_slipped_already() -> None:
     assert cold.slipped == pytest.approx(tool.stiction, abs=0.01)  # it keeps what friction holds
 
 
-@pytest.mark.parametrize(("load", "at"), [("heater", "t8"), ("tip", "t1")])
+@pytest.mark.parametrize(("load", "at"), [("heater", "t8"), ("hot_air", "t1"), ("tip", "t1")])
 def test_heat_goes_in_where_it_should(tool: RestingTool, load: str, at: str) -> None:
     for hours in (0.1, 3.0):
         _, truth = run(tool, tool.init(AIR), FeedDrive(loads={load: 20.0}), hours)
@@ -148,6 +149,11 @@ def test_loads_add_up_and_need_power(tool: RestingTool) -> None:
         return rise
 
     np.testing.assert_allclose(warmed(heater=30.0, tip=5.0), 3.0 * warmed(heater=10.0) + warmed(tip=5.0), atol=1e-9)
+    # W-15: half of the hot air acts at the tip, where the soldering iron acts with all of its heat
+    assert warmed(hot_air=5.0)[tool.places.index("tip")] < 0.7 * warmed(tip=5.0)[tool.places.index("tip")]
+    np.testing.assert_allclose(
+        tool._given(FeedDrive(loads={"heater": 3.0, "hot_air": 4.0, "tip": 1.0}))[[0, 1, 7]], [3.0, 3.0, 2.0]
+    )
     _, off = tool.run(start, [FeedDrive(loads={"heater": 30.0}, powered=False)] * 5, np.tile(air, (5, 1)), 20.0)
     np.testing.assert_allclose(off.temperatures, 20.0, atol=1e-8)
 
@@ -187,7 +193,7 @@ def test_a_room_that_changes_is_felt_in_its_own_step(tool: RestingTool) -> None:
 
 @pytest.mark.parametrize("load", ["coolant", "surface", "t1"])
 def test_heat_without_a_place_is_refused(tool: RestingTool, load: str) -> None:
-    with pytest.raises(InputError, match=f"no heat can be applied at '{load}', only at heater, tip$"):
+    with pytest.raises(InputError, match=f"no heat can be applied at '{load}', only at heater, hot_air, tip$"):
         tool.run(tool.init(AIR), [FeedDrive(loads={load: 5.0})], AIR.values[None], 1.0)
 
 
@@ -210,3 +216,37 @@ def test_unusable_steps_are_refused(tool: RestingTool) -> None:
     for load in (float("nan"), float("inf")):
         with pytest.raises(InputError, match="finite"):
             FeedDrive(loads={"heater": load})
+
+
+@pytest.mark.parametrize("machine", [RestingTool(), NonlinearTool()])
+def test_a_warm_foundation_warms_the_foot(machine: RestingTool) -> None:
+    """W-15: with a foundation at room temperature nothing flows."""
+    warm = machine.mounted("hydraulic", foundation=5.0)
+    rises = {}
+    for tool in (machine, warm):
+        _, truth = run(tool, tool.init(AIR), REST, 60.0, dt=60.0)
+        rises[tool.foundation] = [seen(tool, truth, place)[-1] - 20.0 for place in ("foot", "t7", "t8", "t1")]
+    np.testing.assert_allclose(rises[0.0], 0.0, atol=1e-6)
+    assert 5.0 > rises[5.0][0] > rises[5.0][1] > rises[5.0][2] > rises[5.0][3] > 0.0
+    model = machine.model
+    heat = np.zeros(len(model.inputs))
+    heat[model.inputs.index("on_foot")] = 5.0 * FOOT
+    steady = model.steady(heat, AIR.values, ())
+    np.testing.assert_allclose(warm.init(AIR).field, steady)
+
+
+def test_each_mounting_holds_the_shank_as_its_joint_does() -> None:
+    """W-10: slip limit in proportion to pressure and squared length; heat passes a shrink chuck best."""
+    hold = {m: float(fit.pressure(20.0, 20.0)) * fit.length**2 for m, fit in MOUNTINGS.items()}
+    for mounting, limit in STICTION.items():
+        assert limit == pytest.approx(STICTION["hydraulic"] * hold[mounting] / hold["hydraulic"], rel=0.1)
+        assert RestingTool().mounted(mounting).stiction == limit
+        assert NonlinearTool().mounted(mounting).grip is MOUNTINGS[mounting]
+    conducts = {m: fit.conductance(30.0, 30.0) for m, fit in MOUNTINGS.items()}
+    assert conducts["shrink"] > 2.0 * max(conducts["hydraulic"], conducts["collet"])
+    # torque that slips: 2 pi r^2 L friction p [N m]
+    torque = {
+        m: 2e-3 * np.pi * f.radius**2 * f.length * f.friction * float(f.pressure(20.0, 20.0))
+        for m, f in MOUNTINGS.items()
+    }
+    assert {m: round(t, -1) for m, t in torque.items()} == {"hydraulic": 330.0, "shrink": 530.0, "collet": 200.0}

@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -138,11 +139,34 @@ def test_wessel_heated_tool() -> None:
     assert heating[100:380].mean() > 0 > heating[400:560].mean()  # the break near row 400
     assert heating[580:900].mean() > 0
     assert np.gradient(column(test, "t_t8_C"))[100:780].mean() > 0
+    # three sources that act apart from each other (W-15): heater, hot-air gun, soldering iron
+    for planned in EXPERIMENTS["wessel-tool"].tests:
+        acting = {frozenset(s.loads or {}) for s in planned.segments}
+        assert acting == {
+            frozenset(s) for s in ((), ("heater",), ("hot_air",), ("heater", "hot_air"), ("heater", "tip"))
+        }
     # "a sufficient range of values in the learning series"
     assert (training.truth.max(axis=0) > test.truth.max(axis=0)).all()
     passed = column(training, "t_t8_C")
     assert passed.min() < 30.0
     assert passed.max() > 50.0
+
+
+def test_wessel_three_mountings_in_a_thermal_cell() -> None:
+    """W-10, W-15: 23 data sets of three mountings, in rooms with gradients and on foundations of other temperatures."""
+    planned = EXPERIMENTS["wessel-sets"].programmes(0)
+    mountings = [p.mounting for p in planned]
+    assert {m: mountings.count(m) for m in mountings} == {"hydraulic": 8, "shrink": 8, "collet": 7}
+    assert {(p.climate.mean, p.climate.layers, p.foundation) for p in planned} == {
+        (18.0, 1.5, 2.0),
+        (22.0, 0.2, 0.0),
+        (26.0, -0.5, -3.0),
+    }
+    assert {name for p in planned for s in p.segments for name in s.drive.loads} == {"heater", "hot_air", "tip"}
+    # the same test in another chuck: the tip is displaced otherwise
+    tips = [record("wessel-tool", mounting=m)[1].table["s1_um"] for m in ("", "hydraulic", "shrink", "collet")]
+    assert tips[0].equals(tips[1])
+    assert min(float((a - b).abs().max()) for a, b in combinations(tips[1:], 2)) > 1.0
 
 
 def test_wessel_days_of_milling() -> None:

@@ -13,7 +13,7 @@ from finite_elements.bed import Bed
 from finite_elements.column import Column
 from finite_elements.materials import data, material
 from finite_elements.part import Part
-from finite_elements.reduction import basis, project, reduce
+from finite_elements.reduction import basis, project
 from finite_elements.revolution import with_joints
 from finite_elements.screw import Screw
 from finite_elements.spindle import spindle
@@ -128,14 +128,11 @@ def reduced_centre(*, joints: bool = False) -> ReducedModel:
     return project(full, v, ("nose", "tip"))
 
 
-def reduced_tool(*, joints: bool = False) -> ReducedModel:
-    """Return the resting tool as it is shipped; with joints: for the one that is not linear."""
+def reduced_tool() -> ReducedModel:
+    """Return the resting tool as it is shipped, with joints."""
     table = data("tool.toml")
     settings = table["reduction"]
-    full = tool(joints=joints)
-    if not joints:
-        return reduce(full, settings["size"], settings["mix"], settings["regime"])
-    more = settings["joints"]
+    full, more = tool(joints=True), settings["joints"]
     mixes = settings["mix"] + _passing("tool", more, [f"on_{name}" for name in table["film"]])
     return project(full, basis(full, more["size"], mixes, settings["regime"]), ("s1", "s2", "s3"))
 
@@ -143,9 +140,8 @@ def reduced_tool(*, joints: bool = False) -> ReducedModel:
 #: what makes each of the files in ``simulation/reduced``
 MODELS: dict[str, Callable[[], ReducedModel]] = {
     "centre": reduced_centre,
-    "tool": reduced_tool,
     "centre_joints": partial(reduced_centre, joints=True),
-    "tool_joints": partial(reduced_tool, joints=True),
+    "tool_joints": reduced_tool,
 }
 
 

@@ -32,26 +32,6 @@ AIR_CHANGE = (2.0, 0.5, 0.5)
 _MEMORY = 600.0
 
 
-def reduce(
-    full: FullModel,
-    size: int,
-    mixes: Sequence[Mapping[str, float]],
-    regimes: Sequence[Mapping[str, float]] = ({},),
-    shifts: Sequence[float] = SHIFTS,
-) -> ReducedModel:
-    """Return a model of `size` states.
-
-    Parameters
-    ----------
-    mixes : sequence of mapping of str to float
-        Heat that usually comes together, by input [W]. Each mix counts as an input, and each input counts alone, with
-        its largest heat in any mix.
-    shifts : sequence of float
-        [1/s]
-    """
-    return project(full, basis(full, size, mixes, regimes, shifts))
-
-
 def basis(
     full: FullModel,
     size: int,
@@ -63,6 +43,9 @@ def basis(
 
     Parameters
     ----------
+    mixes : sequence of mapping of str to float
+        Heat that usually comes together, by input [W]. Each mix counts as an input, and each input counts alone, with
+        its largest heat in any mix.
     shifts : sequence of float
         [1/s]
     """

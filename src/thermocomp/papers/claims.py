@@ -13,6 +13,8 @@ order of presentation:
 ``softer``, ``whole``
     Why the criterion is softer than the paper's sentence or number: such a claim holds in part. If the second
     criterion, that of the paper, is also fulfilled, it holds.
+``premise``, ``untestable``
+    Criterion that the virtual machine has to fulfil for the claim to be testable, and the reason if it does not.
 ``note``, ``otherwise``
     Limitation, and the reason shown only if the claim does not hold.
 ``parts``
@@ -82,10 +84,12 @@ class Claims(Generic[_Found]):
     def _claim(self, entry: Mapping[str, Any], facts: Facts, found: _Found) -> Claim:
         said = self._file.sentences(facts, found, entry.get("parts"))
         criterion = entry.get("holds", "holds" if "holds" in facts else "")
-        holds = said.judge(criterion) if criterion else None
+        testable = "premise" not in entry or said.judge(entry["premise"]) is not False
+        holds = said.judge(criterion) if criterion and testable else None
         softer = bool(holds) and "softer" in entry and not (entry.get("whole") and said.judge(entry["whole"]))
         reasons = (
             entry["softer"] if softer else "",
+            "" if testable else entry["untestable"],
             entry.get("note", ""),
             entry.get("otherwise", "") if holds is False else "",
         )
@@ -97,4 +101,5 @@ class Claims(Generic[_Found]):
             holds=holds,
             finding=" ".join(filter(None, map(said.fill, reasons))),
             softer=softer,
+            testable=testable,
         )

@@ -103,5 +103,8 @@ def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
     worse = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False or c.softer > claim.softer]
     otherwise = f"Seed {seed + APART * worse[0][0]}: {worse[0][1].finding}" if claim.holds and worse else ""
     finding = " ".join(text for text in (claim.finding, otherwise) if text)
+    untestable = [f"Seed {seed + APART * k}: {c.finding}" for k, c in enumerate(same, start=1) if not c.testable]
+    if claim.testable and untestable:
+        return replace(claim, finding=untestable[0], holds=None, softer=False, testable=False)
     again = tuple(c.holds for c in same if c.holds is not None)
     return replace(claim, finding=finding, again=again, softer=any(c.softer for c in (claim, *same)))

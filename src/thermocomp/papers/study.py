@@ -42,6 +42,8 @@ class Claim:
         Whether it holds in further runs with other seeds, if the study was repeated.
     softer : bool
         The criterion by which it holds is softer than the paper's sentence or number, as `finding` states.
+    testable : bool
+        Whether the virtual machine has what the claim presupposes; if not, `holds` is None and `finding` states why.
     """
 
     ids: tuple[str, ...]
@@ -52,10 +54,13 @@ class Claim:
     finding: str = ""
     again: tuple[bool, ...] = ()
     softer: bool = False
+    testable: bool = True
 
     @property
     def verdict(self) -> str:
-        """``yes``, ``in part`` or ``no``; ``2 of 3`` if runs disagree; ``-`` for a number for information."""
+        """``yes``, ``in part``, ``no`` or ``not testable``; ``2 of 3`` if runs disagree; ``-``: for information."""
+        if not self.testable:
+            return "not testable"
         if self.holds is None:
             return "-"
         held = (self.holds, *self.again)
@@ -64,9 +69,9 @@ class Claim:
         return ("in part" if self.softer else "yes") if self.holds else "no"
 
     def __post_init__(self) -> None:
-        if (self.holds is False or self.softer) and not self.finding:
+        if (self.holds is False or self.softer or not self.testable) and not self.finding:
             raise ValueError(
-                f"{', '.join(self.ids)}: a claim that does not hold, or only in part, needs a finding that explains it"
+                f"{', '.join(self.ids)}: a claim that does not simply hold needs a finding that explains it"
             )
 
 

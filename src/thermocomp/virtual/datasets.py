@@ -51,6 +51,7 @@ def record(
     experiment: str | Path | Experiment,
     *,
     physics: Physics | None = None,
+    mounting: str = "",
     seed: int = 0,
     sensor_noise: float | None = None,
     faults: Sequence[SensorFault] = (),
@@ -62,12 +63,16 @@ def record(
     ----------
     physics : {'linear', 'nonlinear'}, optional
         Physics of the machine. Default: as defined by the experiment. See :doc:`/virtual_machine`.
+    mounting : str
+        Chuck of the resting tool in all tests: hydraulic, shrink or collet. Default: as defined by the experiment.
     sensor_noise : float, optional
         Standard deviation of the temperature noise [degC]. Default: as defined for each sensor.
     """
     found = experiment if isinstance(experiment, Experiment) else find_experiment(experiment)
     if physics is not None:
         found = replace(found, physics=physics)
+    if mounting:
+        found = replace(found, tests=tuple(replace(t, mounting=mounting) for t in found.tests))
     recordings = []
     for test in simulate(found, seed=seed, sensor_noise=sensor_noise, faults=faults):
         recordings.append(make_recording(test))

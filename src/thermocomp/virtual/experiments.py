@@ -94,7 +94,10 @@ def simulate(
     def test(programme: Programme) -> SimulatedTest:
         weather, noise = (np.random.default_rng(make_seed(seed, programme.name, what)) for what in ("weather", "noise"))
         options: dict[str, Any] = {"sensor_noise": sensor_noise, "faults": faults, "whole": whole}
-        return run(machine, experiment.kit, programme, weather, noise, **options)
+        mounted = machine
+        if isinstance(machine, RestingTool):
+            mounted = machine.mounted(programme.mounting or experiment.kit.mountings[0], programme.foundation)
+        return run(mounted, experiment.kit, programme, weather, noise, **options)
 
     return map(test, experiment.programmes(seed))
 

@@ -94,6 +94,8 @@ class Kit:
         Rotating places, whose temperatures can only be calculated.
     top_speed : float
         Maximum spindle speed [1/min]; 0: no spindle.
+    mountings : tuple of str
+        Chucks in which the tool can be mounted, the usual one first; empty: no choice, and no foundation of its own.
     """
 
     places: Mapping[str, str]
@@ -105,6 +107,7 @@ class Kit:
     loads: Mapping[str, str]
     inner: Mapping[str, str] = field(default_factory=dict)
     top_speed: float = 0.0
+    mountings: tuple[str, ...] = ()
 
     def place(self, name: str, *, perfect: bool) -> str:
         """Return the description of a place where a temperature sensor can be mounted."""
@@ -250,7 +253,12 @@ TOOL = Kit(
     observables=tuple(_AXIAL),
     outfits={"all": tuple(_TOOL_PLACES)},
     nests={"nest": tuple(_AXIAL)},
-    loads={"heater": "heating elements at the bearing's fit of the shaft", "tip": "hot air at the tip"},
+    loads={
+        "heater": "heating elements at the bearing's fit of the shaft",
+        "hot_air": "hot-air gun at the cutting edges",
+        "tip": "soldering iron at the tip",
+    },
+    mountings=("hydraulic", "shrink", "collet"),
 )
 
 #: equipment by machine name in protocols

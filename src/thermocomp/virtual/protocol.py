@@ -48,6 +48,10 @@ class RecordingSetup:
         Sensors without lag, bias, drift, noise and quantisation: a calculation, not a measurement.
     touch : Touch, optional
         A probing cycle.
+    mounting : str
+        Chuck of the resting tool, see `thermocomp.virtual.kits.Kit.mountings`. Default: the usual one.
+    foundation : float
+        Temperature of the foundation of the resting tool relative to the room [K].
     """
 
     sampling: float
@@ -57,12 +61,16 @@ class RecordingSetup:
     perfect: bool = False
     touch: Touch | None = None
     faults: tuple[SensorFault, ...] = ()
+    mounting: str = ""
+    foundation: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.sampling > 0:
             raise SettingError(f"expected a positive interval, found {self.sampling:g} s", ("sampling",))
         if not (self.places or self.probes or self.touch):
             raise SettingError("nothing is recorded: give at least one of places, probes and touch", ("places",))
+        if not abs(self.foundation) <= 30.0:
+            raise SettingError(f"{self.foundation:g} K: must be from -30 to 30", ("foundation",))
 
     def instruments(self, kit: Kit, noise: float | None = None) -> list[Instrument]:
         """Return the mounted instruments: temperatures, displacements, probed points.
@@ -164,6 +172,11 @@ class PlannedTest(RecordingSetup, Stretch):
 
     def check(self, kit: Kit) -> None:
         """Raise `SettingError` if the test requires something that the machine lacks."""
+        for key in ("mounting", "foundation"):
+            if getattr(self, key) and not kit.mountings:
+                raise SettingError("only the resting tool has a choice of mountings and foundations", (key,))
+        if self.mounting and self.mounting not in kit.mountings:
+            raise explain_unknown("mounting", self.mounting, kit.mountings, ("mounting",))
         channels = [i.sensor.channel.name for i in self.instruments(kit)]
         channels += [c.name for c in (SPEED, FEED) if kit.top_speed]
         for k, fault in enumerate(self.faults):

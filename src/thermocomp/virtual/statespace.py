@@ -90,7 +90,7 @@ class ReducedModel:
 
     @classmethod
     def load(cls, name: str) -> "ReducedModel":
-        """Load a model included in the package: ``centre`` or ``tool``, or either with ``_joints``."""
+        """Load a model included in the package: ``centre``, ``centre_joints`` or ``tool_joints``."""
         with as_file(files("thermocomp.virtual") / "reduced" / f"{name}.npz") as path:
             return cls.read(path)
 

@@ -1,8 +1,9 @@
-"""A heated tool at rest in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08)."""
+"""A heated tool at rest in a fixed spindle shaft: the set-up of Wessel 2004, section IV (W-08, W-15)."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,18 @@ from thermocomp.virtual.machine import Air, FeedDrive, Truth, check, stretches
 from thermocomp.virtual.statespace import REFERENCE_TEMPERATURE, ReducedModel
 
 FloatArray = NDArray[np.float64]
-#: places where heat can be applied
-LOADS = ("heater", "tip")
+#: heat sources, and their shares of the inputs of the reduced model: heating elements at the bearing fit, hot-air gun
+#: at the cutting edges, half of whose air flows along the tool (an engineering value), soldering iron at the tip
+SOURCES: Mapping[str, Mapping[str, float]] = {
+    "heater": {"heater": 1.0},
+    "hot_air": {"tip": 0.5, "on_tool": 0.5},
+    "tip": {"tip": 1.0},
+}
+#: conductance of the foot of the body to the foundation, `tools/finite_elements/data/tool.toml` [W/K]
+FOOT = 60.0 * math.pi * 0.1**2
+#: `RestingTool.stiction` by mounting of the tool, in proportion to pressure and squared length of the joints of
+#: `thermocomp.virtual.nonlinear.MOUNTINGS` [um]
+STICTION = {"hydraulic": 0.8, "shrink": 1.3, "collet": 0.4}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +48,9 @@ class ToolState:
 class RestingTool:
     """A chuck with its tool on a fixed shaft; implements `thermocomp.virtual.machine.VirtualMachine`.
 
-    Heaters at the bearing fit warm it from behind, hot air from the tip. Its heat loss is superlinear in temperature
-    (natural convection, radiation), and the shank slips in the chuck only when friction is exceeded.
+    Heaters at the bearing fit warm it from behind, a hot-air gun and a soldering iron from the tip (`SOURCES`). Its
+    heat loss is superlinear in temperature (natural convection, radiation), and the shank slips in the chuck only when
+    friction is exceeded.
 
     Parameters
     ----------
@@ -51,13 +63,16 @@ class RestingTool:
         (laminar).
     longest_step : float
         Longest interval between updates of the heat loss [s].
+    foundation : float
+        Temperature of the foundation relative to the room [K].
     """
 
-    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool"))
+    model: ReducedModel = field(default_factory=lambda: ReducedModel.load("tool_joints"))
     stiction: float = 0.8
     convection: float = 0.35
     usual_rise: float = 20.0
     longest_step: float = 20.0
+    foundation: float = 0.0
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -69,9 +84,13 @@ class RestingTool:
         """Names of the displacements."""
         return self.model.observables
 
+    def mounted(self, mounting: str, foundation: float = 0.0) -> Self:
+        """Return the tool in one of the chucks of `STICTION`, on a foundation of its own temperature [K]."""
+        return replace(self, stiction=STICTION[mounting], foundation=foundation)
+
     def init(self, air: Air) -> ToolState:
-        """Return the state of a tool in equilibrium with the room."""
-        state = self.model.steady(np.zeros(len(self.model.inputs)), air.values, ())
+        """Return the state of a tool in equilibrium with room and foundation."""
+        state = self.model.steady(self._given(FeedDrive()), air.values, ())
         return ToolState(state, self._wish(self._linear(state[None])).item())
 
     def run(self, state: ToolState, drives: Sequence[FeedDrive], air: FloatArray, dt: float) -> tuple[ToolState, Truth]:
@@ -132,8 +151,10 @@ class RestingTool:
         if drive.speed or any(drive.feed):
             raise InputError("the resting tool cannot turn or move: its protocol supports loads only")
         given = np.zeros(len(self.model.inputs))
-        for place, load in drive.loads.items():
-            if place not in LOADS:
-                raise InputError(f"no heat can be applied at {place!r}, only at {', '.join(LOADS)}")
-            given[self.model.inputs.index(place)] = load if drive.powered else 0.0
+        given[self.model.inputs.index("on_foot")] = FOOT * self.foundation
+        for source, load in drive.loads.items():
+            if source not in SOURCES:
+                raise InputError(f"no heat can be applied at {source!r}, only at {', '.join(SOURCES)}")
+            for place, share in SOURCES[source].items():
+                given[self.model.inputs.index(place)] += share * load if drive.powered else 0.0
         return given

@@ -32,7 +32,9 @@ CROSS = "cross"
 TABLE_WIDTH = 120
 
 #: attributes of a claim by their keys in JSON
-_CLAIM = {"ids": "ids", "claim": "text"} | {n: n for n in ("paper", "ours", "holds", "again", "finding", "softer")}
+_CLAIM = {"ids": "ids", "claim": "text"} | {
+    n: n for n in ("paper", "ours", "holds", "again", "finding", "softer", "testable")
+}
 _TONES = {"yes": "good", "no": "grave", "-": "soft"}
 
 

@@ -25,8 +25,8 @@ COLUMNS, INDENT = 88, "    "
 
 
 def count_verdicts(study: Study) -> dict[str, int]:
-    """Return the number of claims by verdict: ``yes``, ``in part``, ``no``, ``some`` (runs disagree) and ``-``."""
-    known = ("yes", "in part", "no", "some", "-")
+    """Return the number of claims by verdict, with ``some`` for those about which the runs disagree."""
+    known = ("yes", "in part", "no", "some", "not testable", "-")
     words = [c.verdict if c.verdict in known else "some" for c in study.claims]
     return {word: words.count(word) for word in known}
 
@@ -42,6 +42,8 @@ def headline(study: Study) -> str:
         line += f", {n['in part']} in part"
     if n["some"]:
         line += f", {n['some']} in some of them"
+    if n["not testable"]:
+        line += f", {n['not testable']} not testable on it"
     return f"{line}; {n['-']} more number{'s' if n['-'] > 1 else ''} next to the paper's" if n["-"] else line
 
 
@@ -57,7 +59,7 @@ def text(study: Study, *ids: str) -> str:
     lines = [] if ids else [study.title, f"{headline(study)}.", ""]
     for c in told:
         lines.append(textwrap.fill(f"{', '.join(c.ids)}: {c.text}", COLUMNS, subsequent_indent=INDENT))
-        judged = ("note", c.finding) if c.holds is None else ("holds", f"{c.verdict}. {c.finding}".removesuffix(". "))
+        judged = ("note", c.finding) if c.verdict == "-" else ("holds", f"{c.verdict}. {c.finding}".removesuffix(". "))
         said = (("paper", c.paper), ("ours", c.ours), judged)
         for name, value in said:
             if value:

@@ -149,7 +149,12 @@ def _enough(s: Selection) -> Facts:
     best = s.by_size
     least = next((k for k, psi in best.items() if (psi > ENOUGH_PSI).all()), "none")
     holds = (best[MOST] > ENOUGH_PSI).all()
-    return {"best": [(k, best[k]) for k in (1, 2, MOST, max(best))], "least": least, "holds": holds}
+    return {
+        "best": [(k, best[k]) for k in (1, 2, MOST, max(best))],
+        "least": least,
+        "single": best[1].min(),
+        "holds": holds,
+    }
 
 
 @claims.facts

@@ -105,6 +105,12 @@ def _series(s: Spindle) -> Facts:
 
 
 @claims.facts
+def _fits(s: Spindle) -> Facts:
+    learned = s.found.learned
+    return {"single": max(ACE().fit(x[:, None], learned.deviations[:, 0]).psi_ for x in learned.values.T)}
+
+
+@claims.facts
 def _close(s: Spindle) -> Facts:
     ace = s.found.rms(ACE_NAME)
     return {"ace": ace, "share": ace / s.span, "beside": s.found.rms_beside(ACE_NAME)}

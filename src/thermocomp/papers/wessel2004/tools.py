@@ -16,6 +16,8 @@ from thermocomp.papers.study import Figure, Panel, Part, Progress, StudyTable
 from thermocomp.papers.wessel2004.sets import PAPERS_OWN, Selection, name_set
 from thermocomp.papers.wessel2004.trial import (
     ACE_NAME,
+    AVERAGED,
+    FROM_START,
     MLR_NAME,
     SWEEPS,
     MillingTrial,
@@ -125,7 +127,9 @@ def _better_at_rest(r: Resting, sets: str) -> Facts:
 
 @milling.facts
 def _better_at_work(found: MillingTrial) -> Facts:
-    return _better(found, range(len(found.learned.inputs)))
+    zeros = [FROM_START.format(m) for m in (MLR_NAME, ACE_NAME)]
+    start = [rms(found.measured - found.estimates[m]) for m in zeros if m in found.estimates]
+    return _better(found, range(len(found.learned.inputs))) | {"zeros": bool(start), "start": start}
 
 
 @resting.facts
@@ -135,7 +139,7 @@ def _locally(r: Resting) -> Facts:
     linear, ace = r.own.residual(MLR_NAME), r.own.residual(ACE_NAME)
     gains = [rms(linear[p]) / max(rms(ace[p]), 1e-9) for p in parts]
     best = int(np.argmax(gains))
-    facts = {"gains": gains, "gain": gains[best], "total": rms(linear) / rms(ace)}
+    facts = r.own.reasons() | {"gains": gains, "gain": gains[best], "total": rms(linear) / rms(ace)}
     return facts | {"first": parts[best][0] + 1, "last": parts[best][-1] + 1}
 
 
@@ -218,7 +222,7 @@ def _sets_table(r: Resting) -> StudyTable:
 def _estimated(found: MillingTrial) -> list[Panel]:
     shown, x = (MLR_NAME, ACE_NAME), points(found.unseen)
     above = {"measured": found.measured} | {m: found.estimates[m] for m in shown}
-    below = {m: found.residual(m) for m in (*shown, "dynamic")}
+    below = {m: found.residual(m) for m in (*shown, AVERAGED)}
     return [
         Panel("", "measuring point", f"{place(found.target)} [um]", curves(x, above, dashed=shown)),
         Panel("", "measuring point", "measured - estimated [um]", curves(x, below)),

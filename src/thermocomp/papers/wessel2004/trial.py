@@ -15,7 +15,7 @@ from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.ols import LeastSquares
 from thermocomp.papers import common
 from thermocomp.papers.claims import Facts
-from thermocomp.papers.common import errors_table, every, fit_and_freeze, predict_deviation, rms
+from thermocomp.papers.common import errors_table, every, fit_and_freeze, predict_deviation, rms, trained
 from thermocomp.papers.pictures import curves
 from thermocomp.papers.study import BoolArray, FloatArray, Panel, StudyTable
 from thermocomp.recordings.recording import Recording
@@ -24,6 +24,8 @@ from thermocomp.recordings.samples import Samples
 ACE_NAME = "ACE"
 MLR_NAME = "multiple linear regression"
 NONE_NAME = "no compensation"
+#: the recommended method of this package, not one of the paper
+AVERAGED = "averaged"
 #: name of a method with temperatures relative to the start of each test
 FROM_START = "{}, from each start"
 #: maximum number of sweeps by the paper's rule: they end when the error no longer decreases, which may take long
@@ -106,6 +108,7 @@ class MillingTrial:
     def rms_by_method(self, prefix: str) -> dict[str, float]:
         """Return the RMS residuals by the short names of the methods, with a prefix."""
         short = {"ace": ACE_NAME, "mlr": MLR_NAME, "ace_monotone": "ace-monotone", "dynamic": "dynamic"}
+        short[AVERAGED] = AVERAGED
         return {f"{prefix}_{key}_rms_um": self.rms(method) for key, method in short.items()}
 
     def table(self, caption: str) -> StudyTable:
@@ -137,7 +140,8 @@ class MillingTrial:
         error, out, reach = self.residual(ACE_NAME), self.flagged, self.reach()
         wide = reach >= np.quantile(reach, 0.9)
         linear = np.corrcoef(self.learned.deviations[:, 0], self.fits[MLR_NAME])[0, 1]
-        facts = {"reasons": True, "ace": self.ace, "ace_rms": rms(error), "mlr": self.rms(MLR_NAME)}
+        facts: Facts = {"reasons": True, "straightness": True, "linear": True, "ace": self.ace}
+        facts |= {"ace_rms": rms(error), "mlr": self.rms(MLR_NAME)}
         facts |= {"fit": self.fit_rms(ACE_NAME), "fit_mlr": self.fit_rms(MLR_NAME), "correlation": linear}
         facts |= {"loop": loop_width(self.learned), "straight": self.straight()}
         facts |= {"outside": out.any(), "flagged": out.sum(), "rows": len(out), "partly": not out.all()}
@@ -191,6 +195,8 @@ def trial(
         timed = [common.stacked(r, [target], [*(c.name for c in learned.inputs), *speeds]) for r in parts]
         memory = DynamicRidge(speed=speeds, time="routed")
         also("dynamic", memory, timed, support=Support(), dt=timed[0].dt(), cycle=timed[0].cycle)
+        averaged = trained(AVERAGED, timed[0])
+        fits[AVERAGED], estimates[AVERAGED] = (predict_deviation(averaged, s) for s in timed)
     return MillingTrial(learned=learned, unseen=unseen, ace=ace, estimates=estimates, fits=fits, flagged=flagged)
 
 
