@@ -20,7 +20,7 @@ LATER, LASTING = range(12, 42), 0.5
 LAGS = 0.35
 #: numbers of rows by which a computed temperature may be late, and its smallest correlation then
 LATE, FOLLOWS = range(13), 0.5
-#: correlations of third differences of an instrument's noise: largest with the next ones, and with those after four rows
+#: correlations of third differences of an instrument's noise: largest with the next, and with those after four rows
 WHITE, MOST = -0.58, 0.15
 #: minimum number of differences
 _ENOUGH = 30
@@ -63,9 +63,9 @@ def leaks(temperatures: Sequence[Signal], displacements: Sequence[Signal], moved
         return
     for name, (_, probe_name) in found.items():
         text = (
-            f"has the noise of {probe_name}, in the same rows or some rows late: it seems to be computed from the displacement, or to "
-            "share its wiring. A model that uses it predicts the displacement from itself; leave it out. If something "
-            "switches every few rows, as a chiller may, record more often"
+            f"has the noise of {probe_name}, in the same rows or some rows late: it seems to be computed from the "
+            "displacement, or to share its wiring. A model that uses it predicts the displacement from itself; leave "
+            "it out. If something switches every few rows, as a chiller may, record more often"
         )
         yield Finding("trouble", name, "leak", text, remedy=column(name, role="ignore"))
 
