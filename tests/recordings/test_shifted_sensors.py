@@ -103,3 +103,8 @@ def test_of_few_sensors_most_of_which_are_off_all_are_told(sensors: int, off: fl
 def test_sensors_that_are_off_by_different_amounts_are_told() -> None:
     told = found([day(k, (5.0, -5.0, 20.0) if k == 4 else (), sensors=5) for k in range(8)])
     assert {f.channel for _, f in told} == {"t0_C", "t1_C", "t2_C"}
+
+
+def test_a_sensor_far_off_is_named_on_a_machine_that_started_warm() -> None:
+    told = found([day(k, (4.0, 3.0, 5.0, 2.5, 30.0) if k == 3 else (), sensors=16) for k in range(8)])
+    assert [f.channel for _, f in told] == ["t4_C"]

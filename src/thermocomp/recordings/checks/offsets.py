@@ -24,7 +24,8 @@ def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...]
     The start of each temperature is compared with its usual start, the one nearest to the median of all recordings,
     after the change common to all temperatures (their median) is removed. It is off if it differs by more than
     `Thresholds.start_reported` and 4 times the robust standard deviation of all such differences. A recording in which
-    more than `MOST` of the temperatures are off started from another thermal state, which shifts no sensor.
+    more than `MOST` of the temperatures are off started from another thermal state: only those that are off by more
+    than `Thresholds.zero_change`, as no machine is, are named then.
     """
     common = {c.name for c in recordings[0].temperatures} if recordings else set[str]()
     for r in recordings[1:]:
@@ -76,5 +77,6 @@ def _offsets(start: FloatArray) -> FloatArray:
     off = np.where(sound, change - find_usual(change), 0.0)
     spread = 1.4826 * float(np.median(np.abs(off[:, sound])))
     off[np.abs(off) <= max(THRESHOLDS.start_reported, _USUAL * spread)] = 0.0
-    off[(off != 0).sum(axis=1) > MOST] = 0.0
+    many = (off != 0).sum(axis=1, keepdims=True) > MOST
+    off[many & (np.abs(off) <= THRESHOLDS.zero_change)] = 0.0
     return off
