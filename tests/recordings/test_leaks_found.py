@@ -37,11 +37,17 @@ def leaking(how: str, recording: Recording, target: str) -> Recording:
         "mixed": 0.5 * made + 0.5 * recording.table[first],
         "negative": 30.0 - 0.05 * y,
         "curved": 22.0 + 0.05 * y + 0.0005 * y**2,
+        "one row late": made.shift(1).bfill().round(2),
+        "ten rows late": made.shift(10).bfill().round(2),
+        "first-order lag of 60 s": made.ewm(alpha=-np.expm1(-recording.sampling_interval / 60.0)).mean(),
+        "mean of five rows": made.rolling(5, min_periods=1).mean(),
+        "mean of nine rows, late": made.shift(4).bfill().rolling(9, min_periods=1).mean(),
     }[how]
     return replace(recording, table=recording.table.assign(**{second: found}))
 
 
 HOWS = ["exact", "noisy", "rounded", "smoothed", "mixed", "negative", "curved"]
+HOWS += ["one row late", "ten rows late", "first-order lag of 60 s", "mean of five rows", "mean of nine rows, late"]
 
 
 @pytest.mark.parametrize("how", HOWS)

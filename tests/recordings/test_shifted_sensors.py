@@ -85,3 +85,26 @@ def test_check_and_fit_report_it() -> None:
     assert fitted.models["z_um"].inputs[0].reference < 25.0
     judged = tc.assess(fitted, [day(9, (-20.0,))]).judged
     assert judged.offsets["day 9"] == {"t0_C": pytest.approx(-20.0, abs=2.0)}
+
+
+@pytest.mark.parametrize(("sensors", "off"), [(3, 20.0), (4, 20.0), (5, -40.0), (3, 5.0), (4, 5.0), (5, 5.0)])
+def test_of_few_sensors_most_of_which_are_off_all_are_told(sensors: int, off: float) -> None:
+    """Two of three to five, on one day: the sound one was named, or none. By 5 degC nothing tells which are right."""
+    for shifted in (2, 3) if sensors > 3 else (2,):
+        told = found([day(k, [off] * shifted if k == 4 else (), sensors=sensors) for k in range(8)])
+        assert {k for k, _ in told} == {4}
+        named = {f.channel for _, f in told}
+        if abs(off) > 15.0 or 2 * shifted < sensors:  # no day is so much warmer
+            assert named == {f"t{k}_C" for k in range(shifted)}
+        for _, f in told:
+            assert ("or the others are off" in f.text) == (abs(off) <= 15.0)
+
+
+def test_sensors_that_are_off_by_different_amounts_are_told() -> None:
+    told = found([day(k, (5.0, -5.0, 20.0) if k == 4 else (), sensors=5) for k in range(8)])
+    assert {f.channel for _, f in told} == {"t0_C", "t1_C", "t2_C"}
+
+
+def test_a_sensor_far_off_is_named_on_a_machine_that_started_warm() -> None:
+    told = found([day(k, (4.0, 3.0, 5.0, 2.5, 30.0) if k == 3 else (), sensors=16) for k in range(8)])
+    assert [f.channel for _, f in told] == ["t4_C"]

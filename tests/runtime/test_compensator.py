@@ -240,7 +240,31 @@ def test_one_sensor_that_is_off_at_the_start_counts_by_its_rises(off: float) -> 
     _, result = step(models, OPEN, state, Reading(60.0, warm), 60.0)
     assert result.deviations["z"].offset == pytest.approx(1.0 + 2.0 + 1.0)
     said = describe_start(models, state.models)
-    assert said.startswith(f"compared with the training, these start off the other temperatures: t2 {off:+.1f} degC: ")
+    if off == 12.0:  # a day 6 degC warmer, with the two others 12 degC too cold, would read the same
+        assert "sensors disagree at the start: t2 +12.0 degC, t0 +0.0 degC, t1 +0.0 degC: which" in said
+    else:
+        told = f"compared with the training, these start off the other temperatures: t2 {off:+.1f} degC: "
+        assert said.startswith(told)
+
+
+@pytest.mark.parametrize("off", [-40.0, -20.0, -5.0, 1.0, 5.0, 20.0, 40.0])
+@pytest.mark.parametrize(("count", "shifted"), [(3, 1), (3, 2), (4, 1), (4, 2), (4, 3), (5, 3), (6, 3), (16, 3)])
+def test_a_start_is_not_refused_for_one_to_three_sensors(off: float, count: int, shifted: int) -> None:
+    """They were, when the median itself was off by 20 degC; a constant offset does a rise no harm."""
+    inputs = tuple(Input(f"t{k}", "temperature", "degC", 20.0, True, -1.0, 4.0) for k in range(count))
+    one = replace(three_sensors("dimensionless", "1"), lag_signals=(), time_constants=(), lagged=())
+    models = [replace(one, inputs=inputs, signals=tuple((k,) for k in range(count)), direct=(1.0,) * count)]
+    begin = {f"t{k}": 18.0 + off * (k < shifted) for k in range(count)}  # 2 degC colder than in the training
+    state, result = step(models, OPEN, start(models), Reading(0.0, begin), 0.0)
+    assert not result.rejected
+    warm = {name: value + 1.0 for name, value in begin.items()}
+    state, result = step(models, OPEN, state, Reading(60.0, warm), 60.0)
+    assert not result.rejected
+    assert result.deviations["z"].offset == pytest.approx(count)
+    said = describe_start(models, state.models)
+    assert all(f"t{k} " in said for k in range(shifted))
+    may = 2 * (min(shifted, count - shifted) + 1) >= count and abs(off - 2.0) <= 15.0
+    assert ("cannot be told" in said) == may
 
 
 @pytest.mark.parametrize("off", [43.0, 49.6])

@@ -450,3 +450,29 @@ def test_a_sensor_with_a_wrong_gain_is_not_used_again_after_a_rest(watch: Watch,
     assert mine.size
     assert (own[mine[0] :] != GOOD).all()
     assert (np.diff(samples.values[mine[0] :, -1]) != 0).sum() > 4  # with rests
+
+
+@pytest.mark.parametrize("physics", ["linear", "nonlinear"])
+@pytest.mark.parametrize("step", [0.1, 0.5, 1.0])
+def test_sensors_coarser_than_in_training_are_not_stuck_and_stuck_ones_are_found(physics: str, step: float) -> None:
+    """All sensors, and each alone, are rounded in use: warm-up, cool-down and rest of all cycles; then one sticks."""
+    whole = stack(virtual.record("demo", physics=physics), ["z_um"])  # type: ignore[arg-type]
+    fine = whole.take(np.arange(len(whole)) % 6 == 0).only([*SIX, "spindle_rpm"])
+    found = find_watch(fine, fine.cycle != 3)
+    assert found is not None
+    row, n = int(np.flatnonzero((fine.cycle == 3) & ~fine.stands)[5]), len(SIX)
+    values = np.repeat(fine.values[:, None], 2 * n + 1, axis=1)
+    coarse = np.round(fine.values / step) * step
+    values[:, : n + 1, :n] = coarse[:, None, :n]
+    for k in range(n):
+        values[row:, 1 + k, k] = coarse[row, k]
+        values[:, 1 + n + k, k] = coarse[:, k]
+    _, first, when, _ = run(found, fine, values)
+    assert not (first[[0, *range(1 + n, 1 + 2 * n)]] == STUCK).any()
+    for k in range(n):
+        moved = np.abs(fine.values[row:, k] - fine.values[row, k]) > 3.5 * max(step, 0.3) + 1.0
+        if moved.any():
+            assert first[1 + k, k] in (STUCK, UNEXPLAINED)
+            if step < 1.0:  # the stuck housing of 1 degC makes the speed look wrong first
+                assert when[1 + k, k] <= fine.time[row:][moved][0] + 1800.0
+        assert not (np.delete(first[1 + k], k) == STUCK).any()

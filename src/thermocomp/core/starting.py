@@ -9,7 +9,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.state import State
-from thermocomp.core.thresholds import Thresholds
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 
 
 def find_middle(offsets: Sequence[float]) -> float:
@@ -18,6 +18,15 @@ def find_middle(offsets: Sequence[float]) -> float:
         return 0.0
     ordered = sorted(offsets)
     return min(ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2], key=abs)
+
+
+def find_day(offsets: Sequence[float], most: float) -> float:
+    """Return the median of offsets, or the one nearest to 0 if the median is more than `most` [degC].
+
+    A day that warm is less likely than a majority of shifted sensors.
+    """
+    middle = find_middle(offsets)
+    return min(sorted(offsets), key=abs) if abs(middle) > most else middle
 
 
 def find_usual(rows: FloatArray) -> FloatArray:
@@ -43,11 +52,26 @@ def find_offsets(inputs: Sequence[Input], zero: Sequence[float], thresholds: Thr
     -------
     dict of str to float
         Offset from the others, relative to the zero of the training [degC]. Only the rises from the zero are used, so
-        an offset does no harm.
+        an offset does no harm. All temperatures, if those that are off may be right, and the others off.
     """
     own = {i.name: z - i.reference for i, z in zip(inputs, zero, strict=True) if i.rezero and math.isfinite(z)}
-    middle = find_middle(list(own.values()))
-    return {name: offset - middle for name, offset in own.items() if abs(offset - middle) > thresholds.start_reported}
+    day = find_day(list(own.values()), thresholds.zero_change)
+    off = [offset for offset in own.values() if abs(offset - day) > thresholds.start_reported]
+    open_ = may_be_right(off, len(own), thresholds.zero_change)
+    return {name: o - day for name, o in own.items() if open_ or abs(o - day) > thresholds.start_reported}
+
+
+def may_be_right(off: Sequence[float], count: int, most: float) -> bool:
+    """Return whether those of `count` temperatures that are off the others may be right, and the others off.
+
+    Parameters
+    ----------
+    off : sequence of float
+        Their offsets from the training [degC].
+    most : float
+        Largest offset of a day [degC].
+    """
+    return 2 * (len(off) + 1) >= count and any(abs(offset) <= most for offset in off)
 
 
 def describe_start(models: Sequence[ErrorModel], states: Sequence[State]) -> str:
@@ -60,9 +84,14 @@ def describe_start(models: Sequence[ErrorModel], states: Sequence[State]) -> str
 
 def describe_offsets(offsets: Mapping[str, float]) -> str:
     """Return which temperatures start off the others, as text; empty if there are none."""
-    told = [f"{name} {offset:+.1f} degC" for name, offset in sorted(offsets.items(), key=lambda o: -abs(o[1]))]
+    told = ", ".join(f"{name} {offset:+.1f} degC" for name, offset in sorted(offsets.items(), key=lambda o: -abs(o[1])))
+    if any(abs(offset) <= THRESHOLDS.start_reported for offset in offsets.values()):
+        return (
+            f"compared with the training, sensors disagree at the start: {told}: which of them are right cannot be "
+            "told; only their rises from here on are used"
+        )
     return (
-        f"compared with the training, these start off the other temperatures: {', '.join(told)}: shifted sensors, or "
+        f"compared with the training, these start off the other temperatures: {told}: shifted sensors, or "
         "a machine that had not settled; only their rises from here on are used"
         if told
         else ""

@@ -82,6 +82,12 @@ class Thresholds:
     )
     heat_factor: float = _fixed(2.0, "", "a speed beyond this multiple of the top speed adds no heat", _WATCH)
     fast_factor: float = _fixed(1.02, "", "differences are not evaluated beyond this multiple of the top speed", _WATCH)
+    unknown_step: float = _fixed(
+        1.0, "degC", "a temperature that has not changed yet may be from a sensor of this resolution", _WATCH
+    )
+    same_moved: float = _fixed(
+        2.0, "resolutions", "rounding hides a change of up to one, and shifts a prediction by as much", _WATCH
+    )
     least_unseen: float = _fixed(0.05, "degC", "least error by which differences are weighted", _WATCH)
     difference_time: float = _fixed(1800.0, "s", "time constant of the usual difference from the prediction", _WATCH)
     swap_evidence: float = _fixed(

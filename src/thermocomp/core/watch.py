@@ -53,6 +53,9 @@ class Watched:
     frozen : float
         Change of the prediction, while all temperatures repeat, above which the source has stopped; 0: not known, as in
         a file of an earlier version: `moved` instead [degC].
+    step : float
+        Typical smallest change in the recordings: resolution, or noise; 0: not known, as in a file of an earlier
+        version: half of `moved` is taken for twice this [degC].
     """
 
     input: int
@@ -63,6 +66,7 @@ class Watched:
     still: float
     unseen: float
     frozen: float = 0.0
+    step: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,7 @@ class Watch:
         check_between("watch", LEAST, RANGE, top_speed=self.top_speed)
         for name in ("off", "jump", "moved"):
             check_between("watch", LEAST, READING, **{name: [getattr(s, name) for s in self.sensors]})
-        for name in ("unseen", "frozen"):
+        for name in ("unseen", "frozen", "step"):
             check_between("watch", 0.0, READING, **{name: [getattr(s, name) for s in self.sensors]})
         check_between("watch", 1.0, READING, repeats=self.repeats)
         check_between("watch", LEAST, GAP, still=[s.still for s in self.sensors])
@@ -262,15 +266,17 @@ class Watch:
         return first, second
 
     def limits(self, what: str) -> FloatArray:
-        """Return one field of `Watched` for each sensor, (n_sensors,): off, jump, moved, still, unseen or frozen."""
+        """Return one field of `Watched` for each sensor, (n_sensors,), such as off; of `step`, the largest usual."""
         return self._limits[what]
 
     @cached_property
     def _limits(self) -> dict[str, FloatArray]:
-        names = ("off", "jump", "moved", "still", "unseen", "frozen")
+        names = ("off", "jump", "moved", "still", "unseen", "frozen", "step")
         found = {name: np.array([getattr(s, name) for s in self.sensors], dtype=np.float64) for name in names}
         found["unseen"] = np.maximum(found["unseen"], self.thresholds.least_unseen)
         found["frozen"] = np.where(found["frozen"] > 0.0, found["frozen"], found["moved"])
+        twice = self.thresholds.same_moved * found["step"]  # that of few changes is larger
+        found["step"] = np.where(found["step"] > 0.0, twice, found["moved"] / self.thresholds.same_moved)
         return found
 
     @cached_property

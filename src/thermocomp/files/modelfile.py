@@ -138,6 +138,9 @@ def watch_entry(watch: Watch) -> dict[str, Any]:
         del entry["repeats"]  # as in a file from before these numbers
         for sensor in entry["sensors"]:
             del sensor["frozen"]
+    if not any(s["step"] for s in entry["sensors"]):
+        for sensor in entry["sensors"]:
+            del sensor["step"]
     return {k: v for k, v in entry.items() if v or k not in ("checks", "speed_faults")}
 
 

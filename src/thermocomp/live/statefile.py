@@ -25,7 +25,7 @@ from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.state import CompensatorState
 from thermocomp.runtime.watch import WORDS, WatchState
 
-KIND = jsonfile.Format("thermocomp-state", 4, "state file", "thermocomp serve")
+KIND = jsonfile.Format("thermocomp-state", 5, "state file", "thermocomp serve")
 
 
 #: maximum magnitude of an error [um]
@@ -109,6 +109,9 @@ def loads(text: str, compensator: Compensator, source: str = "state") -> Saved:
         entry = _of_version_1(stored.state) if content.version == 1 else stored.state
         entry = _of_version_3(entry) if content.version <= 3 else entry
         state = decode(CompensatorState, entry, "state")
+        if content.version <= 4:  # the resolutions of the temperatures are learned again
+            watches = (w._replace(step=np.full_like(w.same, np.inf)) for w in state.watches)
+            state = state._replace(watches=tuple(watches))
         _check(state, compensator)
     except (ValueError, InputError) as e:
         raise ModelFileError(f"{source}: not a valid state of these models: {e}; start without the file") from e

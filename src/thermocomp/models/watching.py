@@ -80,7 +80,8 @@ def find_watch(samples: Samples, learn: BoolArray) -> Watch | None:
         limits = _limits(samples, change[:, k], predicted[:, place], folds, k, pace, wider)
         _, moved, _ = _same(samples.values[:, heat], predicted[:, place], samples.time, folds)
         worst = float(np.nanmax(np.abs(change[:, k] - predicted[:, place]), initial=0.0))
-        limits["frozen"] = max(THRESHOLDS.repeat_moved * _resolution(samples.values[:, k]), worst, SAFETY * moved)
+        limits["step"] = _resolution(samples.values[:, k])
+        limits["frozen"] = max(THRESHOLDS.repeat_moved * limits["step"], worst, SAFETY * moved)
         numbers = {name: float(f"{v:.4g}") for name, v in limits.items()}
         sensors.append(Watched(k, tuple(float(f"{w:.6g}") for w in weights[0, :, place]), **numbers))
     wider *= HEATED / SAFETY

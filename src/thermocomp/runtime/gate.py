@@ -17,7 +17,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.reading import Reading
-from thermocomp.core.starting import find_middle, find_start_span
+from thermocomp.core.starting import find_day, find_start_span
 from thermocomp.core.thresholds import Thresholds
 
 #: any finite number
@@ -49,13 +49,13 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
 
 def _no_start(offsets: Sequence[tuple[Input, float]], thresholds: Thresholds) -> str:
     """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
-    middle = find_middle([offset for _, offset in offsets])
+    day = find_day([offset for _, offset in offsets], thresholds.zero_change)
     for channel, offset in offsets:
         start = f"{channel.name} = {channel.reference + offset:g} {channel.unit} is not plausible as a start"
-        if abs(middle) > thresholds.zero_change:
-            return f"{start}: the machine differs by {middle:+.1f} degC from the zero of the training data"
-        if abs(offset - middle) > find_start_span(channel, thresholds):
-            apart = f"{offset - middle:+.1f} degC from the others"
+        if abs(day) > thresholds.zero_change:
+            return f"{start}: the machine differs by {day:+.1f} degC from the zero of the training data"
+        if abs(offset - day) > find_start_span(channel, thresholds):
+            apart = f"{offset - day:+.1f} degC from the others"
             return f"{start}: relative to the zero of the training data, it differs by {apart}"
     return ""
 

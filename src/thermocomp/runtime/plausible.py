@@ -12,7 +12,8 @@ BoolArray = NDArray[np.bool_]
 def replace_first(watch: Watch, values: FloatArray) -> FloatArray:
     """Return the first readings; an implausible one gets the others' median offset from the zero of the training.
 
-    Plausible readings are those that the gate of the compensator accepts at a start.
+    Plausible readings are those that the gate of the compensator accepts at a start; for the offset of the day see
+    `thermocomp.core.starting.find_day`.
     """
     zero, (low, _, width) = np.array([watch.inputs[s.input].reference for s in watch.sensors]), watch.ranges
     zero = zero + np.where([watch.inputs[s.input].rezero for s in watch.sensors], 0.0, low)  # absolute inputs: no zero
@@ -25,9 +26,10 @@ def replace_first(watch: Watch, values: FloatArray) -> FloatArray:
             np.nan_to_num(np.take_along_axis(ordered, middle, axis=-1))
             for middle in (np.maximum(count - 1, 0) // 2, np.minimum(count // 2, np.maximum(count - 1, 0)))
         )
-        day = np.where(np.abs(above) < np.abs(below), above, below)
+        day, most_day = np.where(np.abs(above) < np.abs(below), above, below), watch.thresholds.zero_change
+        nearest = np.where(np.isfinite(ordered), np.abs(ordered), np.inf).argmin(axis=-1, keepdims=True)
+        day = np.where(np.abs(day) > most_day, np.take_along_axis(ordered, nearest, axis=-1), day)
         fits = np.abs(offset - day) <= span
-    most_day = watch.thresholds.zero_change
     return np.where(fits, values, zero + np.clip(day, -most_day, most_day))
 
 

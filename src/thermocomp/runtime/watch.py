@@ -56,6 +56,7 @@ class WatchState(NamedTuple):
     evidence: FloatArray  #: (..., n_pairs), low-passed evidence that two are swapped; -inf: excluded
     fast: FloatArray  #: (...,), last time at which the spindle turned faster than in the training [s]
     heat: HeatState = HeatState()  #: supervision of the speeds
+    step: FloatArray = np.empty(0)  #: smallest change between two checks: resolution, or noise; inf: unknown [degC]
 
     @property
     def sound(self) -> bool:
@@ -107,6 +108,7 @@ def begin(watch: Watch, reference: FloatArray | None = None, runs: tuple[int, ..
         evidence=np.zeros((*runs, len(watch.pairs[0]))),
         fast=np.full(runs, -np.inf),
         heat=heat.begin(watch, runs) if watch.checks else HeatState(),
+        step=np.full(n, np.inf),
     )
 
 
@@ -221,13 +223,15 @@ def _step(
     taus = np.repeat(watch.time_constants, len(watch.sensors))
     traces = lagbank.advance(s.traces, np.tile(inner, len(watch.time_constants)), dt, taus) if taus.size else s.traces
     s = s._replace(memory=memory, predicted=predicted, used=used, usual=usual, traces=traces)
-    s, stuck = _stuck(watch, s, x, calm, dt)
+    s, stuck, unsure = _stuck(watch, s, x, calm, dt)
     over = np.abs(np.where(calm, difference, 0.0) / find_limits(watch, memory)) > 1.0
     far = np.asarray(over.any(axis=-1, keepdims=True))
     found, wrong = heat.check(watch, s.heat, speeds, used, memory, (time, dt), failed, far, _last_change(s, calm))
     s = s._replace(heat=found)
     s, lasting = _beyond(watch, s._replace(fast=_fast(watch, s, change)), over, calm)
-    s = _blame(watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, lasting, wrong))
+    s = _blame(
+        watch, s, np.where(calm | waiting, x, used), calm | waiting, dt, (stepped, stuck, unsure, lasting, wrong)
+    )
     return _returns(watch, s, difference)
 
 
@@ -241,7 +245,7 @@ def _calmed(watch: Watch, change: FloatArray) -> FloatArray:
 
 def _jumps(watch: Watch, s: WatchState, x: FloatArray, dt: float, able: BoolArray) -> tuple[WatchState, BoolArray]:
     """Find new jumps, discard spikes, and return the jumps that last."""
-    limit = watch.limits("jump") * max(1.0, dt / watch.pace)
+    limit = (watch.limits("jump") + _coarser(watch, s)) * max(1.0, dt / watch.pace)
     waiting = np.isfinite(s.jumped)
     with np.errstate(invalid="ignore"):
         before = np.where(waiting, s.predicted + s.usual, s.used)
@@ -267,16 +271,21 @@ def _missing(s: WatchState, seen: BoolArray) -> WatchState:
     )
 
 
-def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray, dt: float) -> tuple[WatchState, BoolArray]:
+def _stuck(
+    watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray, dt: float
+) -> tuple[WatchState, BoolArray, BoolArray]:
     """Find sensors that are constant although their prediction moves, or for too long while others change.
 
-    Between two readings at most `fault_duration` counts: after a gap, a value may be the same by chance.
+    Between two readings at most `fault_duration` counts: after a gap, a value may be the same by chance. A sensor with
+    a resolution coarser than in the training may be constant for hours: its prediction must move by its error and more.
+    One that has never changed may be as coarse as `Thresholds.unknown_step`: up to then (returned last) it is unsure.
     """
     gap = max(dt - watch.thresholds.fault_duration, 0.0)
     same = x == s.same
+    s = s._replace(step=np.fmin(s.step, np.where(same, np.inf, np.abs(x - s.same))))
     if not same.any():
         nan = np.full(x.shape, np.nan)
-        return s._replace(same=x, still=np.full(x.shape, s.time), then=s.predicted, moving=nan), same
+        return s._replace(same=x, still=np.full(x.shape, s.time), then=s.predicted, moving=nan), same, same
     with np.errstate(invalid="ignore"):
         apart = np.abs(s.predicted - s.then)
     fresh = ~same
@@ -285,13 +294,29 @@ def _stuck(watch: Watch, s: WatchState, x: FloatArray, calm: BoolArray, dt: floa
         still=np.where(fresh, s.time, s.still + gap),
         then=np.where(fresh, s.predicted, s.then),
     )
-    moves = same & calm & (apart > watch.limits("moved"))
+    coarser, limits = _coarser(watch, s), watch.thresholds
+    # a fine reading is constant for minutes, a coarse one for so long that the error of its prediction matters
+    most = np.maximum(watch.limits("moved"), watch.limits("frozen"))
+    least = np.where(coarser > 0.0, most + coarser, watch.limits("moved"))
+    able = calm | ((s.fault == UNEXPLAINED) & np.isfinite(x))
+    moves = same & able & (apart > least)
     moving = np.where(moves, np.where(np.isfinite(s.moving), s.moving, s.time), np.nan)
     s = s._replace(moving=moving)
     lives = (calm & fresh).sum(axis=-1, keepdims=True) > 0  # not all are constant, as with a stopped logger
-    long = same & calm & lives & (s.time - s.still > watch.limits("still"))
-    lasting = (s.time - moving >= watch.thresholds.fault_duration) & (_last_change(s, calm) > moving)
-    return s, (moves & lasting) | long
+    long = same & calm & lives & (coarser == 0.0) & (s.time - s.still > watch.limits("still"))
+    found = (moves & (s.time - moving >= limits.fault_duration) & (_last_change(s, calm) > moving)) | long
+    unsure = np.isinf(s.step) & (apart <= most + limits.same_moved * limits.unknown_step)
+    return s, found & ~unsure, found & unsure & calm
+
+
+def _coarser(watch: Watch, s: WatchState) -> FloatArray:
+    """Return by how much rounding may move readings more than in the training, (..., n_sensors) [degC].
+
+    A sensor that has not changed yet is taken for as coarse as all others.
+    """
+    excess = watch.thresholds.same_moved * np.maximum(s.step - watch.limits("step"), 0.0)
+    least = excess.min(axis=-1, keepdims=True)
+    return np.where(np.isfinite(excess), excess, np.where(np.isfinite(least), least, 0.0))
 
 
 def _last_change(s: WatchState, calm: BoolArray) -> FloatArray:
@@ -318,12 +343,13 @@ def _blame(
     x: FloatArray,
     able: BoolArray,
     dt: float,
-    found: tuple[BoolArray, BoolArray, BoolArray, BoolArray],
+    found: tuple[BoolArray, ...],
 ) -> WatchState:
     """Exclude failed sensors: a swapped pair or a speed if it explains all residuals best; else single sensors."""
-    stepped, stuck, lasting, speeds = found
+    stepped, stuck, unsure, lasting, speeds = found
+    some = (stepped | stuck | unsure).any(axis=-1)
     counts = np.where(s.time - s.fast[..., None] > watch.thresholds.fault_rest, dt, 0.0)
-    wrong = lasting | (stepped | stuck).any(axis=-1) | speeds.any(axis=-1)
+    wrong = lasting | some | speeds.any(axis=-1)
     evidence, both = weigh_swaps(watch, s.evidence, x, s.memory, able, counts, find=bool(wrong.any()))
     s = s._replace(evidence=evidence)
     if not wrong.any():
@@ -333,17 +359,19 @@ def _blame(
     rest = np.minimum(one.rest, speeds_fail(watch, x, s.memory, able, s.heat))
     doubt = heat.in_doubt(watch, s.heat, s.time) & ~speeds.any(axis=-1)  # then no temperature is excluded
     pair = (both.worst <= 1.0) & (watch.thresholds.swap_preferred * both.rest < rest)
-    swapped = (lasting | (stepped | stuck).any(axis=-1)) & ~doubt & pair
+    swapped = (lasting | some) & ~doubt & pair
     certain = watch.thresholds.swap_certain * both.rest < rest
     for mine, fault in ((swapped & certain, SWAPPED), (swapped & ~certain, UNEXPLAINED)):
         s = _fail(watch, s, mine[..., None] & both.sensors, fault, np.zeros(x.shape))
-    for alone, fault, bridge in ((stepped, STEPPED, s.usual), (stuck, STUCK, x - s.then)):
-        s = _fail(watch, s, alone & ~swapped[..., None] & (s.fault == GOOD), fault, bridge)
+    onset = np.where(s.fault == GOOD, x - s.then, s.used - s.predicted)
+    for alone, fault, bridge in ((stepped, STEPPED, s.usual), (unsure, UNEXPLAINED, onset), (stuck, STUCK, onset)):
+        may = (s.fault == GOOD) | ((s.fault == UNEXPLAINED) & (fault == STUCK))
+        s = _fail(watch, s, alone & ~swapped[..., None] & may, fault, bridge)
     calm = able & np.isnan(s.jumped)
     one = one_fails(watch, np.where(calm, x - s.predicted, 0.0), calm, s.heat)
     # speeds explain the residuals better; the states of estimated speeds lag behind
     slow = speeds_fail(watch, x, s.memory, calm, s.heat) < watch.thresholds.speed_preferred * one.rest
-    alone = ~swapped & ~(stepped | stuck).any(axis=-1)
+    alone = ~swapped & ~some
     if (fails := speeds & (alone & slow & ~pair)[..., None]).any():
         supervised, memory = heat.fail(watch, s.heat, s.memory, fails)
         s = s._replace(heat=supervised, memory=memory, off=np.where(fails.any(axis=-1, keepdims=True), np.nan, s.off))

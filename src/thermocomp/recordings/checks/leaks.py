@@ -18,6 +18,10 @@ NOISE = -0.2
 LATER, LASTING = range(12, 42), 0.5
 #: largest difference of the correlations one row earlier and later, relative to that of the same row: neither lags
 LAGS = 0.35
+#: numbers of rows by which a computed temperature may be late, and its smallest correlation then
+LATE, FOLLOWS = range(13), 0.5
+#: correlations of third differences of an instrument's noise: largest with the next, and with those after four rows
+WHITE, MOST = -0.58, 0.15
 #: minimum number of differences
 _ENOUGH = 30
 
@@ -59,9 +63,9 @@ def leaks(temperatures: Sequence[Signal], displacements: Sequence[Signal], moved
         return
     for name, (_, probe_name) in found.items():
         text = (
-            f"has the noise of {probe_name}, in the same rows: it seems to be computed from the displacement, or to "
-            "share its wiring. A model that uses it predicts the displacement from itself; leave it out. If something "
-            "switches every few rows, as a chiller may, record more often"
+            f"has the noise of {probe_name}, in the same rows or some rows late: it seems to be computed from the "
+            "displacement, or to share its wiring. A model that uses it predicts the displacement from itself; leave "
+            "it out. If something switches every few rows, as a chiller may, record more often"
         )
         yield Finding("trouble", name, "leak", text, remedy=column(name, role="ignore"))
 
@@ -87,14 +91,30 @@ def _certainty(x: FloatArray, y: FloatArray) -> float:
     """Return the correlation of ranks times the root of their number; 0 if it is small, lags, or goes on for many rows.
 
     What is computed follows at once, and its noise ends after a few rows; a process such as a chiller that is switched
-    on and off reaches two places with different lags, and goes on.
+    on and off reaches two places with different lags, and goes on. Noise of an instrument may be followed late: by what
+    was delayed, averaged, or filtered.
     """
     both = np.flatnonzero(x * y)
     size, common = float(np.sqrt((x[both] @ x[both]) * (y[both] @ y[both]))), abs(float(x @ y))
-    if common < LEAST * size or not common:
+    count = float(np.sqrt(both.size))
+    if not size:
+        return 0.0
+    late = max(abs(float(x[k:] @ y[: len(y) - k])) for k in LATE if k < len(x))
+    if late >= FOLLOWS * size and _is_white(y):
+        return late / size * count
+    if common < LEAST * size:
         return 0.0
     later = [abs(float(a[k:] @ b[:-k])) for k in LATER if k < len(x) for a, b in ((x, y), (y, x))]
     lags = abs(float(x[1:] @ y[:-1]) - float(y[1:] @ x[:-1]))
     if lags > LAGS * common or max(later, default=0.0) > LASTING * common:
         return 0.0
-    return common / size * float(np.sqrt(both.size))
+    return common / size * count
+
+
+def _is_white(y: FloatArray) -> bool:
+    """Return whether third differences are those of an instrument's noise, which no process has.
+
+    Those of white noise have correlations of -0.75, 0.3 and -0.05 with the next three, and none with those after.
+    """
+    own = [float(y[k:] @ y[:-k]) for k in (1, *range(4, 13)) if k < len(y)]
+    return own[0] <= WHITE * float(y @ y) and max(map(abs, own[1:]), default=0.0) <= MOST * float(y @ y)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
-from thermocomp.core.starting import find_middle, find_usual
+from thermocomp.core.starting import find_day, find_usual, may_be_right
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
@@ -24,8 +24,8 @@ def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...]
     The start of each temperature is compared with its usual start, the one nearest to the median of all recordings,
     after the change common to all temperatures (their median) is removed. It is off if it differs by more than
     `Thresholds.start_reported` and 4 times the robust standard deviation of all such differences. A recording in which
-    more than `MOST`, or more than half of the temperatures are off started from another thermal state, which shifts no
-    sensor.
+    more than `MOST` of the temperatures are off started from another thermal state: only those that are off by more
+    than `Thresholds.zero_change`, as no machine is, are named then.
     """
     common = {c.name for c in recordings[0].temperatures} if recordings else set[str]()
     for r in recordings[1:]:
@@ -41,10 +41,13 @@ def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...]
             if offset and not before:
                 last = next((i for i in range(k, len(off)) if not off[i, j]), len(off))
                 until = f"until {recordings[last - 1].name}" if last < len(off) else "to the last one"
+                mine = [o for o in off[k].tolist() if o]
+                other = may_be_right(mine, len(names), THRESHOLDS.zero_change)
+                instead = f" (or the others are off, by {-offset:+.1f} degC: which, cannot be told)" if other else ""
                 text = (
-                    f"starts {offset:+.1f} degC off the other temperatures, compared with the other recordings, from "
-                    f"here {until} ({last - k} of {len(off)}): a sensor that was moved, replaced or wired differently, "
-                    "or a machine that had not cooled. Only its rises from the start are used"
+                    f"starts {offset:+.1f} degC off the other temperatures, compared with the other recordings"
+                    f"{instead}, from here {until} ({last - k} of {len(off)}): a sensor that was moved, replaced or "
+                    "wired differently, or a machine that had not cooled. Only its rises from the start are used"
                 )
                 found[k].append(Finding("warning", name, "offset", text, row=0))
             before = offset
@@ -70,9 +73,10 @@ def _offsets(start: FloatArray) -> FloatArray:
     if not sound.any():
         return np.zeros(start.shape)
     change = np.where(sound, start - start[0], 0.0)
-    change -= np.array([find_middle(own) for own in change[:, sound].tolist()])[:, None]
+    change -= np.array([find_day(own, THRESHOLDS.zero_change) for own in change[:, sound].tolist()])[:, None]
     off = np.where(sound, change - find_usual(change), 0.0)
     spread = 1.4826 * float(np.median(np.abs(off[:, sound])))
     off[np.abs(off) <= max(THRESHOLDS.start_reported, _USUAL * spread)] = 0.0
-    off[(off != 0).sum(axis=1) > min(MOST, off.shape[1] / 2)] = 0.0
+    many = (off != 0).sum(axis=1, keepdims=True) > MOST
+    off[many & (np.abs(off) <= THRESHOLDS.zero_change)] = 0.0
     return off

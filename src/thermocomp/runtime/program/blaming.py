@@ -18,7 +18,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     weigh_swaps(s, w, t, choose(~s.was_fast | (w.now - s.fast > t.fault_rest), elapsed, 0.0))
     alone = let("alone", flag(False))
     for i in each("i", t.SENSORS):
-        with when(w.stepped[i] | w.stuck[i]):
+        with when(w.stepped[i] | w.stuck[i] | w.unsure[i]):
             alone.set(True)
     slow = let("slow", flag(False))
     with when(t.supervised):
@@ -43,11 +43,8 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             w.onset[i] = s.usual[i]
         w.new_fault = STEPPED
         fail(s, w, t)
-        for i in each("i", t.SENSORS):
-            w.failing[i] = w.stuck[i] & ~swapped & s.fault[i].equals(GOOD)
-            w.onset[i] = w.x[i] - s.then_predicted[i]
-        w.new_fault = STUCK
-        fail(s, w, t)
+        with when(~swapped):
+            fail_stuck(s, w, t)
         for i in each("i", t.SENSORS):
             w.able[i] = w.able[i] & ~s.has_jumped[i]
             w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
@@ -69,6 +66,20 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
                 w.onset[i] = 0.0
             w.new_fault = UNEXPLAINED
             fail(s, w, t)
+
+
+@procedure
+def fail_stuck(s: Kept, w: Work, t: Constants) -> None:
+    """Exclude constant sensors: stuck ones, and those that may be coarse instead."""
+    for i in each("i", t.SENSORS):
+        w.onset[i] = choose(s.fault[i].equals(GOOD), w.x[i] - s.then_predicted[i], s.used[i] - s.predicted[i])
+        w.failing[i] = w.unsure[i] & s.fault[i].equals(GOOD)
+    w.new_fault = UNEXPLAINED
+    fail(s, w, t)
+    for i in each("i", t.SENSORS):
+        w.failing[i] = w.stuck[i] & (s.fault[i].equals(GOOD) | s.fault[i].equals(UNEXPLAINED))
+    w.new_fault = STUCK
+    fail(s, w, t)
 
 
 @procedure

@@ -37,6 +37,21 @@ def sort(s: Kept, w: Work, t: Constants) -> None:
         gap.set(gap // 2)
 
 
+@procedure
+def find_day(s: Kept, w: Work, t: Constants) -> None:
+    """Sort a column of offsets at a start, and leave that of the day in `middle`; see `core.starting.find_day`."""
+    w.middle = 0.0
+    with when(w.rows > 0):
+        sort(s, w, t)
+        w.middle = w.column[(w.rows - 1) // 2]
+        with when(abs(w.column[w.rows // 2]) < abs(w.middle)):
+            w.middle = w.column[w.rows // 2]
+        with when(abs(w.middle) > t.zero_change):
+            for k in each("k", w.rows):
+                with when(abs(w.column[k]) < abs(w.middle)):
+                    w.middle = w.column[k]
+
+
 @function
 def smaller(one: Number, other: Number) -> Number:
     """Return the smaller of two numbers."""

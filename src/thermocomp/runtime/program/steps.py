@@ -20,7 +20,7 @@ from thermocomp.runtime.program.language import (
     procedure,
     when,
 )
-from thermocomp.runtime.program.numbers import larger, smaller, sort
+from thermocomp.runtime.program.numbers import find_day, larger, smaller
 from thermocomp.runtime.program.values import Number, Whole
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 
@@ -125,10 +125,7 @@ def check_start(s: Kept, w: Work, t: Constants, g: Whole) -> None:
             w.column[w.rows] = w.value[t.channel[r]] - t.reference[r]
             w.rows = w.rows + 1
     with when(w.rows > 0):
-        sort(s, w, t)
-        w.middle = w.column[(w.rows - 1) // 2]
-        with when(abs(w.column[w.rows // 2]) < abs(w.middle)):
-            w.middle = w.column[w.rows // 2]
+        find_day(s, w, t)
         for m in each("m", t.set_begin[g], t.set_begin[g + 1]):
             r.set(t.set_range[m])
             with when(t.temperature[r] & t.rezero[r]):

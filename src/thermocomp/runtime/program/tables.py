@@ -58,6 +58,8 @@ OF_WATCH = (
     "speed_return",
     "swap_preferred",
     "swap_certain",
+    "unknown_step",
+    "same_moved",
     "speed_preferred",
 )
 
@@ -345,7 +347,7 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "gain": bank.gain.tolist(),
         "direct": direct.tolist(),
         "weight": weight.tolist(),
-        **{f"{name}_limit": watch.limits(name).tolist() for name in ("jump", "moved", "frozen", "still")},
+        **{f"{name}_limit": watch.limits(name).tolist() for name in ("jump", "moved", "frozen", "still", "step")},
         "off_limit": [*watch.limits("off").tolist(), *heats.off.tolist()],
         "unseen": unseen.tolist(),
         "shape": (watch.signatures / unseen[:, None]).tolist(),

@@ -1,5 +1,6 @@
 """Monitoring of the temperatures with scalars and loops only: see `thermocomp.runtime.watch` for explanations."""
 
+from thermocomp.runtime.feed import NONE
 from thermocomp.runtime.program import blaming, heating
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.language import (
@@ -13,7 +14,7 @@ from thermocomp.runtime.program.language import (
     raised,
     when,
 )
-from thermocomp.runtime.program.numbers import follow, larger, smaller, sort
+from thermocomp.runtime.program.numbers import find_day, follow, larger, smaller
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 from thermocomp.runtime.watch import GOOD, MISSING, OFF, UNEXPLAINED
@@ -82,12 +83,7 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
         with when(w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature)):
             w.column[w.rows] = w.value[c] - t.start_zero[i]
             w.rows = w.rows + 1
-    w.middle = 0.0
-    with when(w.rows > 0):
-        sort(s, w, t)
-        w.middle = w.column[(w.rows - 1) // 2]
-        with when(abs(w.column[w.rows // 2]) < abs(w.middle)):
-            w.middle = w.column[w.rows // 2]
+    find_day(s, w, t)
     for i in each("i", t.SENSORS):
         c.set(t.sensor_channel[i])
         fits = let("fits", w.given[c] & (w.value[c] >= t.least_temperature) & (w.value[c] <= t.most_temperature))
@@ -117,6 +113,7 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
         for i in each("i", t.SENSORS):
             s.used[i] = w.change[t.sensor_input[i]]
             s.still[i] = w.now
+            s.step[i] = NONE
         for k in each("k", t.SPEEDS):
             w.speed[k] = w.change[t.speed_input[k]] + s.watch_zero[t.speed_input[k]]
         calm_down(s, w, t)
@@ -197,8 +194,9 @@ def look(s: Kept, w: Work, t: Constants) -> None:
 @procedure
 def find_jumps(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     """Find jumps, discard spikes, and confirm lasting jumps."""
+    find_coarser(s, w, t)
     for i in each("i", t.SENSORS):
-        slack = let("slack", t.jump_limit[i])
+        slack = let("slack", t.jump_limit[i] + w.coarser[i])
         with when(elapsed > t.pace):
             slack.set(slack * (elapsed / t.pace))
         w.before[i] = choose(s.has_jumped[i], s.predicted[i] + s.usual[i], s.used[i])
@@ -235,8 +233,11 @@ def find_stuck(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
     lives = let("lives", flag(False))
     gap = let("gap", choose(elapsed > t.fault_duration, elapsed - t.fault_duration, 0.0))
     for i in each("i", t.SENSORS):
-        same = let("same", w.there[i] & s.read_once[i] & w.x[i].equals(s.same[i]))
-        w.changed[i] = ~same
+        both = let("both", w.there[i] & s.read_once[i])
+        w.changed[i] = ~(both & w.x[i].equals(s.same[i]))
+        step = let("step", abs(w.x[i] - s.same[i]))
+        with when(both & w.changed[i] & (step < s.step[i])):
+            s.step[i] = step
         with when(w.calm[i] & w.changed[i]):
             lives.set(True)
     w.last_change = -1e30
@@ -244,8 +245,14 @@ def find_stuck(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         s.still[i] = choose(w.changed[i], w.now, s.still[i] + gap)
         with when(w.calm[i] & (s.still[i] > w.last_change)):
             w.last_change = s.still[i]
+    find_coarser(s, w, t)
     for i in each("i", t.SENSORS):
-        moves = let("moves", ~w.changed[i] & w.calm[i] & (abs(s.predicted[i] - s.then_predicted[i]) > t.moved_limit[i]))
+        apart = let("apart", abs(s.predicted[i] - s.then_predicted[i]))
+        able = let("able", w.calm[i] | (w.there[i] & s.fault[i].equals(UNEXPLAINED)))
+        most = let("most", larger(t.moved_limit[i], t.frozen_limit[i]))
+        coarse = let("coarse", w.coarser[i] > 0.0)
+        least = let("least", choose(coarse, most + w.coarser[i], t.moved_limit[i]))
+        moves = let("moves", ~w.changed[i] & able & (apart > least))
         with when(w.changed[i]):
             s.read_once[i] = w.there[i]
             s.same[i] = w.x[i]
@@ -254,8 +261,25 @@ def find_stuck(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
             s.moving[i] = w.now
         s.is_moving[i] = moves
         w.stuck[i] = moves & (w.now - s.moving[i] >= t.fault_duration) & (w.last_change > s.moving[i])
-        with when(~w.changed[i] & w.calm[i] & lives & (w.now - s.still[i] > t.still_limit[i])):
+        lasts = let("lasts", lives & ~coarse & (w.now - s.still[i] > t.still_limit[i]))
+        with when(~w.changed[i] & w.calm[i] & lasts):
             w.stuck[i] = True
+        unsure = let("unsure", (s.step[i] >= NONE) & (apart <= most + t.same_moved * t.unknown_step))
+        w.unsure[i] = w.stuck[i] & unsure & w.calm[i]
+        w.stuck[i] = w.stuck[i] & ~unsure
+
+
+@procedure
+def find_coarser(s: Kept, w: Work, t: Constants) -> None:
+    """Find by how much rounding may move readings more than in the training."""
+    least = let("least", real(NONE))
+    for i in each("i", t.SENSORS):
+        w.coarser[i] = t.same_moved * larger(s.step[i] - t.step_limit[i], real(0.0))
+        with when(w.coarser[i] < least):
+            least.set(w.coarser[i])
+    for i in each("i", t.SENSORS):
+        with when(s.step[i] >= NONE):
+            w.coarser[i] = choose(least < NONE, least, 0.0)
 
 
 @procedure
