@@ -136,10 +136,6 @@ class RefusedAnswer(AnswerPart):
     detail: str
 
 
-#: values over time, a list of the same length for each curve, ``time`` among them
-CurvesAnswer = dict[str, list[Number]]
-
-
 def describe(*refusals: int, answer: Any = None) -> dict[int | str, dict[str, Any]]:
     """Return the description of the answers of a route, for ``responses``.
 

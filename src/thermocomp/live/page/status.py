@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, StreamingResponse
 
 from thermocomp.live.loop import Service
-from thermocomp.live.page.answers import CurvesAnswer, StateAnswer, describe
+from thermocomp.live.page.answers import Number, StateAnswer, describe
 from thermocomp.live.page.connections import Guarded
 from thermocomp.live.page.doors import Json, write_json
 from thermocomp.live.page.pages import Board, read_template
@@ -79,7 +79,7 @@ def make_router(board: Board) -> APIRouter:
     async def tell() -> Json:
         return Json(snapshot(service, board.settled))
 
-    @router.get("/api/curves", responses=describe(403, answer=CurvesAnswer))
+    @router.get("/api/curves", responses=describe(403, answer=dict[str, list[Number]]))
     async def draw() -> Json:
         return Json(curves(service))
 
