@@ -5,6 +5,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
 from itertools import islice
 from pathlib import Path
 from queue import SimpleQueue
@@ -12,41 +13,45 @@ from typing import Any
 
 from mutants.draw import draw
 from mutants.run import KILLED, RAISED, SURVIVED, Copy
-from mutants.table import Project
+from mutants.table import WANTED, Project
 
-#: killed mutants per requirement, and mutants tried for them at most
-WANTED, TRIED = 2, 16
+#: changes tried for a requirement at most
+TRIED = 16
 
 
 def examine(project: Project, copy: Copy, key: str, seed: int) -> dict[str, Any]:
-    """Draw mutants of a requirement until enough are killed; return its entry of the table."""
-    entry = project.state(key) | {"seed": seed, "raised": 0, "mutants": []}
-    outcomes = copy.run(project.tests[key])
-    failed = sorted({t for outcome, t in outcomes if outcome in (KILLED, RAISED)})
-    missing = [t for t in project.tests[key] if not any(n.startswith(f"tests/{t}") for o, n in outcomes if o == "passed")]
-    if failed or len(missing) == len(project.tests[key]):
-        raise SystemExit(f"{key}: without a mutant these do not pass: {', '.join(failed or missing)}")
-    for m in islice(draw(project.package, project.code[key], seed, key), TRIED):
-        said = {"piece": m.piece, "before": m.before, "after": m.after}
-        if reason := project.equivalent(m.piece, m.before, m.after):
-            entry["mutants"].append(said | {"verdict": "equivalent", "reason": reason})
+    """Draw changes of a requirement's code until enough of them are judged; return its entry of the table."""
+    found: list[dict[str, Any]] = []
+    raised = 0
+    for m in islice(draw(copy.package, project.code[key], seed, key), TRIED):
+        told = {"piece": m.piece, "before": m.before, "after": m.after}
+        if reason := project.reason(told):
+            found.append(told | {"verdict": "equivalent", "reason": reason})
             continue
-        begin = time.perf_counter()
-        verdict, test = copy.judge(m.piece.partition("::")[0], m.text, project.tests[key])
-        print(f"{key} {verdict:8} {time.perf_counter() - begin:5.1f} s  {m.piece.partition('::')[0]}:{m.line} {test}")
+        begin, file = time.perf_counter(), m.piece.partition("::")[0]
+        verdict, test = copy.judge(file, m.text, project.tests[key])
+        line = f"{key} {verdict:8} {time.perf_counter() - begin:5.1f} s  {file}:{m.line} {test}"
+        print(line + (f"\n    - {m.before}\n    + {m.after}" if verdict == SURVIVED else ""), flush=True)
         if verdict == RAISED:
-            entry["raised"] += 1
+            raised += 1
             continue
-        if verdict == SURVIVED:
-            print(f"    - {m.before}\n    + {m.after}")
-        entry["mutants"].append(said | {"verdict": verdict} | ({"by": test} if test else {}))
-        sys.stdout.flush()
-        if sum(x["verdict"] != "equivalent" for x in entry["mutants"]) == WANTED:
+        found.append(told | {"verdict": verdict} | ({"by": test} if test else {}))
+        if sum(x["verdict"] != "equivalent" for x in found) == WANTED:
             break
-    return entry
+    return project.state(key, copy.folder) | {"seed": seed, "raised": raised, "mutants": found}
+
+
+def check(project: Project, copy: Copy, keys: list[str]) -> list[str]:
+    """Run the tests of requirements without a change; return those that fail, and those that are skipped or missing."""
+    tests = sorted({t for k in keys for t in project.tests[k]})
+    outcomes = copy.run(tests)
+    failed = [t for outcome, t in outcomes if outcome in (KILLED, RAISED)]
+    passed = {t.partition("[")[0] for outcome, t in outcomes if outcome == "passed"}
+    return failed or [t for k in keys if passed.isdisjoint(project.tests[k]) for t in project.tests[k]]
 
 
 def main() -> int:
+    """Run the mutants of some requirements; return 1 if a mutant survives."""
     parser = argparse.ArgumentParser(prog="make mutants", description=__doc__)
     parser.add_argument("ids", nargs="*", help="of requirements, or how they begin; default: those that have changed")
     parser.add_argument("--all", action="store_true", help="all requirements")
@@ -55,11 +60,12 @@ def main() -> int:
     asked = parser.parse_args()
     project = Project(Path(__file__).resolve().parents[2])
     keys = [k for k in project.tests if asked.all or any(k.startswith(i) for i in asked.ids)]
-    keys = keys if asked.all or asked.ids else project.stale()
-    with tempfile.TemporaryDirectory(prefix="mutants-") as name:
+    if not (asked.all or asked.ids):
+        keys = [k for k in project.tests if project.gaps(k)]
+    with tempfile.TemporaryDirectory(prefix="mutants-") as name, ExitStack() as stack:
         copies: SimpleQueue[Copy] = SimpleQueue()
-        for k in range(min(asked.jobs, len(keys))):
-            copies.put(Copy(project.root, Path(name) / str(k)))
+        for k in range(asked.jobs):
+            copies.put(stack.enter_context(closing(Copy(project.root, Path(name) / str(k)))))
 
         def work(key: str) -> dict[str, Any]:
             copy = copies.get()
@@ -68,14 +74,18 @@ def main() -> int:
             finally:
                 copies.put(copy)
 
+        copies.put(copy := copies.get())
+        if keys and (wrong := check(project, copy, keys)):
+            print("without a change these tests do not pass:", *wrong, sep="\n    ", file=sys.stderr)
+            return 2
         with ThreadPoolExecutor(asked.jobs) as pool:
             for key, entry in zip(keys, pool.map(work, keys), strict=True):
                 project.table[key] = entry
                 project.save()
     verdicts = [m["verdict"] for k in keys for m in project.table[k]["mutants"]]
-    raised = sum(project.table[k]["raised"] for k in keys)
     counts = ", ".join(f"{verdicts.count(v)} {v}" for v in (KILLED, SURVIVED, "equivalent"))
-    print(f"{len(keys)} requirements: {counts}; {raised} only raised and do not count")
+    raised = sum(project.table[k]["raised"] for k in keys)
+    print(f"{len(keys)} requirements: {counts}; {raised} only raised an error, and do not count")
     return int(any(project.gaps(k) for k in keys))
 
 

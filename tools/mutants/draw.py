@@ -6,24 +6,17 @@ import random
 import re
 from collections.abc import Iterator
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-#: a float that is a tenth larger is another number; tolerances that do not matter have to be argued
+#: operators, and what takes their place
+OPERATORS = {"<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",)}
+OPERATORS |= {"+": ("-",), "-": ("+",), "in": ("not in",), "not in": ("in",), "is": ("is not",), "is not": ("is",)}
+OPERATOR = re.compile(rb"not in|is not|[<>=!]=|[<>+-]|\bin\b|\bis\b")
+#: a floating-point number becomes larger by a tenth
 LARGER = 1.1
-COMPARED: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
-    ast.Lt: ("<", ("<=", ">=")),
-    ast.LtE: ("<=", ("<", ">")),
-    ast.Gt: (">", (">=", "<=")),
-    ast.GtE: (">=", (">", "<")),
-    ast.Eq: ("==", ("!=",)),
-    ast.NotEq: ("!=", ("==",)),
-    ast.In: ("in", ("not in",)),
-    ast.NotIn: ("not in", ("in",)),
-    ast.Is: ("is", ("is not",)),
-    ast.IsNot: ("is not", ("is",)),
-}
-#: not drawn from: types and decorators; nor texts, messages, and conditions under which nothing but an error is raised
+#: not drawn from: types, decorators, texts, messages, and the conditions under which nothing but an error is raised
 SKIPPED = {"annotation", "returns", "decorator_list", "type_params"}
 #: in a value of TOML, also in a text such as "6 min"
 NUMBER = re.compile(rb"(?<![\w.-])\d+(?:\.\d+)?(?![\w.:-])")
@@ -40,22 +33,21 @@ class Site(NamedTuple):
 
 
 class Mutant(NamedTuple):
-    """A change of a piece of code."""
+    """A change of a piece of code: its first line, the changed lines, and the text of the file with it."""
 
     piece: str
     line: int
-    before: str  #: the changed lines
+    before: str
     after: str
-    text: str  #: the whole file
+    text: str
 
 
-def find(tree: ast.AST, name: str) -> ast.AST | None:
-    """Return the function, class or constant of a qualified name; None if there is none."""
-    node: ast.AST | None = tree
-    for part in filter(None, name.split(".")):
-        named = [n for n in getattr(node, "body", ()) if part in names(n)]
-        node = named[-1] if named else None
-    return node
+class Piece(NamedTuple):
+    """A function, class or constant, such as ``core/terms.py::TermTable``; a module; or keys of a TOML file."""
+
+    text: bytes  #: of the whole file
+    node: ast.AST | None  #: None in TOML
+    lines: range
 
 
 def names(node: ast.stmt) -> list[str]:
@@ -67,100 +59,34 @@ def names(node: ast.stmt) -> list[str]:
 
 
 @cache
-def parsed(path: Path) -> tuple[bytes, ast.Module | None]:
-    """Return a file, and its syntax tree if it is Python."""
-    text = path.read_bytes()
-    return text, ast.parse(text) if path.suffix == ".py" else None
-
-
-def span(package: Path, piece: str) -> tuple[Path, bytes, ast.AST | None, int, int]:
-    """Return the file of a piece, its text, its node (None in TOML), and the first and the last line of the piece."""
+def find(package: Path, piece: str) -> Piece:
+    """Return a piece of the package; KeyError if there is none of this name."""
     file, _, name = piece.partition("::")
-    text, tree = parsed(package / file)
-    node = tree and find(tree, name)
-    if tree and node is None:
-        raise KeyError(f"there is no {name} in {file}")
-    if not isinstance(node, ast.stmt):
-        return package / file, text, node, 1, text.count(b"\n") + 1
+    text = (package / file).read_bytes()
+    everything = range(1, text.count(b"\n") + 2)
+    if not file.endswith(".py"):
+        return Piece(text, None, everything)
+    node: ast.Module | ast.stmt = ast.parse(text)
+    for part in filter(None, name.split(".")):
+        named = [n for n in getattr(node, "body", ()) if part in names(n)]
+        if not named:
+            raise KeyError(f"there is no {name} in {file}")
+        node = named[-1]
+    if isinstance(node, ast.Module):
+        return Piece(text, node, everything)
     first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", ()))])
-    return package / file, text, node, first, node.end_lineno or first
+    return Piece(text, node, range(first, (node.end_lineno or first) + 1))
 
 
 def fingerprint(package: Path, piece: str) -> str:
     """Return the hash of a piece without its docstrings, comments in lines of their own, and indentation."""
-    _, text, node, first, last = span(package, piece)
+    text, node, wanted = find(package, piece)
     told: set[int] = set()
     for inner in ast.walk(node) if node else ():
         if isinstance(inner, Definition | ast.Module) and ast.get_docstring(inner) is not None:
             told.update(range(inner.body[0].lineno, (inner.body[0].end_lineno or 0) + 1))
-    lines = [line.strip() for k, line in enumerate(text.splitlines(), start=1) if first <= k <= last and k not in told]
+    lines = [line.strip() for k, line in enumerate(text.splitlines(), start=1) if k in wanted and k not in told]
     return hashlib.sha256(b"\n".join(x for x in lines if x and not x.startswith(b"#"))).hexdigest()[:12]
-
-
-def sites(text: bytes, node: ast.AST | None, keys: str = "") -> Iterator[Site]:
-    """Yield the changes of a piece; of TOML, those of the numbers of some keys, such as ``speed|duration``."""
-    begins = [0, *(m.end() for m in re.finditer(b"\n", text))]
-
-    def at(n: ast.AST, *, end: bool = False) -> int:
-        line, column = (n.end_lineno, n.end_col_offset) if end else (n.lineno, n.col_offset)  # type: ignore[attr-defined]
-        return int(begins[line - 1] + column)
-
-    def between(kind: str, left: ast.AST, right: ast.AST, old: str, new: str) -> Iterator[Site]:
-        start, end = at(left, end=True), at(right)
-        gap = re.sub(rb"#[^\n]*", lambda m: b" " * len(m[0]), text[start:end])
-        if (k := gap.find(old.encode())) >= 0:
-            yield Site(kind, start + k, start + k + len(old), new)
-
-    def exchanged(parts: list[ast.expr]) -> Iterator[Site]:
-        for a, b in zip(parts, parts[1:], strict=False):
-            one, gap, other = text[at(a) : at(a, end=True)], text[at(a, end=True) : at(b)], text[at(b) : at(b, end=True)]
-            if one != other and fixed(a) and fixed(b):
-                yield Site("exchange", at(a), at(b, end=True), (other + gap + one).decode())
-
-    def changes(n: ast.AST, *, index: bool, table: bool) -> Iterator[Site]:
-        match n:
-            case ast.Constant(value=bool() | int() | float() as value):
-                for new in numbers(value):
-                    yield Site("index" if index else "constant", at(n), at(n, end=True), new)
-            case (
-                ast.comprehension(iter=ast.Constant(value=str() as value) as word)
-                | ast.For(iter=ast.Constant(value=str() as value) as word)
-                | ast.Assign(value=ast.Constant(value=str() as value) as word)
-            ) if len(value) > 1 and value.isupper():  # the letters of axes
-                yield Site("constant", at(word), at(word, end=True), repr(value[:-1]))
-            case ast.UnaryOp(op=ast.USub()):
-                yield Site("sign", at(n), at(n.operand), "")
-            case ast.BinOp(left=left, op=ast.Add() | ast.Sub() as op, right=right):
-                yield from between("sign", left, right, *("+-" if isinstance(op, ast.Add) else "-+"))
-            case ast.AugAssign(target=left, op=ast.Add() | ast.Sub() as op, value=right):
-                yield from between("sign", left, right, *("+-" if isinstance(op, ast.Add) else "-+"))
-            case ast.Compare(left=left, ops=ops, comparators=others):
-                for a, op, b in zip([left, *others], ops, others, strict=False):
-                    old, news = COMPARED[type(op)]
-                    for new in news:
-                        yield from between("comparison", a, b, old, new)
-            case (ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Dict(values=parts)) if table:
-                yield from exchanged(parts)
-
-    def walk(n: ast.AST, *, index: bool, table: bool) -> Iterator[Site]:
-        yield from changes(n, index=index, table=table)
-        refusal = isinstance(n, ast.If) and all(isinstance(inner, ast.Raise) for inner in n.body)
-        for field, value in ast.iter_fields(n):
-            if field not in SKIPPED and not (refusal and field == "test"):
-                for inner in value if isinstance(value, list) else [value]:
-                    strict = isinstance(inner, ast.keyword) and inner.arg == "strict"
-                    if isinstance(inner, ast.AST) and not (strict or isinstance(inner, ast.JoinedStr | ast.Raise)):
-                        deeper = table and not isinstance(inner, ast.FunctionDef)
-                        inside = field == "slice" or (index and isinstance(n, ast.Slice | ast.UnaryOp | ast.Tuple))
-                        yield from walk(inner, index=inside, table=deeper)
-
-    if node is None:
-        for value in re.finditer(rb'(?<!\w)(?:%s) *= *("[^"\n]*"|\[[^]]*\]|[^,}\n]*)' % keys.encode(), text):
-            for m in NUMBER.finditer(text, *value.span(1)):
-                for new in numbers(float(m[0]) if b"." in m[0] else int(m[0])):
-                    yield Site("constant", *m.span(), new)
-    else:
-        yield from walk(node, index=False, table=not isinstance(node, ast.FunctionDef))
 
 
 def numbers(value: float) -> list[str]:
@@ -182,13 +108,81 @@ def fixed(node: ast.expr) -> bool:
     return True
 
 
+class Sites:
+    """The places of a text that may be changed."""
+
+    def __init__(self, text: bytes) -> None:
+        self._text = text
+        self._begins = [0, *(m.end() for m in re.finditer(b"\n", text))]
+
+    def _span(self, n: ast.expr) -> tuple[int, int]:
+        end = self._begins[(n.end_lineno or 0) - 1] + (n.end_col_offset or 0)
+        return self._begins[n.lineno - 1] + n.col_offset, end
+
+    def in_toml(self, keys: str) -> Iterator[Site]:
+        """Yield the numbers in the values of some keys, such as ``speed|duration``."""
+        for value in re.finditer(rb'(?<!\w)(?:%s) *= *("[^"\n]*"|\[[^]]*\]|[^,}\n]*)' % keys.encode(), self._text):
+            for m in NUMBER.finditer(self._text, *value.span(1)):
+                for new in numbers(float(m[0]) if b"." in m[0] else int(m[0])):
+                    yield Site("constant", *m.span(), new)
+
+    def inside(self, n: ast.AST, *, index: bool = False, table: bool = True) -> Iterator[Site]:
+        """Yield the places in a node; `index`: it is a subscript; `table`: it is not part of a function."""
+        table = table and not isinstance(n, ast.FunctionDef)
+        yield from self._at(n, index=index, table=table)
+        refusal = isinstance(n, ast.If) and all(isinstance(inner, ast.Raise) for inner in n.body)
+        for field, value in ast.iter_fields(n):
+            below = field == "slice" or (index and isinstance(n, ast.Slice | ast.UnaryOp | ast.Tuple))
+            for inner in value if isinstance(value, list) else [value]:
+                strict = isinstance(inner, ast.keyword) and inner.arg == "strict"
+                passed = field in SKIPPED or strict or (refusal and field == "test")
+                if isinstance(inner, ast.AST) and not (
+                    passed or isinstance(inner, ast.JoinedStr | ast.Raise | ast.Assert)
+                ):
+                    yield from self.inside(inner, index=below, table=table)
+
+    def _at(self, n: ast.AST, *, index: bool, table: bool) -> Iterator[Site]:
+        match n:
+            case ast.Constant(value=bool() | int() | float() as value):
+                yield from (Site("index" if index else "constant", *self._span(n), new) for new in numbers(value))
+            case (
+                ast.comprehension(iter=ast.Constant(value=str() as letters) as word)
+                | ast.For(iter=ast.Constant(value=str() as letters) as word)
+                | ast.Assign(value=ast.Constant(value=str() as letters) as word)
+            ) if len(letters) > 1 and letters.isupper():  # of axes
+                yield Site("constant", *self._span(word), repr(letters[:-1]))
+            case ast.UnaryOp(op=ast.USub()):
+                yield Site("sign", self._span(n)[0], self._span(n.operand)[0], "")
+            case (
+                ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right)
+                | ast.AugAssign(target=left, op=ast.Add() | ast.Sub(), value=right)
+            ):
+                yield from self._operator("sign", left, right)
+            case ast.Compare(left=left, comparators=others):
+                for pair in pairwise([left, *others]):
+                    yield from self._operator("comparison", *pair)
+            case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Dict(values=parts) if table:
+                for a, b in pairwise(parts):
+                    (start, k), (m, end), text = self._span(a), self._span(b), self._text
+                    if text[start:k] != text[m:end] and fixed(a) and fixed(b):
+                        yield Site("exchange", start, end, (text[m:end] + text[k:m] + text[start:k]).decode())
+
+    def _operator(self, kind: str, left: ast.expr, right: ast.expr) -> Iterator[Site]:
+        start, end = self._span(left)[1], self._span(right)[0]
+        gap = re.sub(rb"#[^\n]*", lambda m: b" " * len(m[0]), self._text[start:end])
+        if m := OPERATOR.search(gap):
+            for new in OPERATORS[m[0].decode()]:
+                yield Site(kind, start + m.start(), start + m.end(), new)
+
+
 def draw(package: Path, pieces: list[str], seed: int, key: str) -> Iterator[Mutant]:
-    """Yield all changes of a requirement's code in an order that the seed draws: a kind first, then one of that kind."""
+    """Yield all changes of a requirement's code in the order of a seed: a kind is drawn first, then one of it."""
     rng = random.Random(f"{seed} {key}")
     left: dict[str, list[tuple[str, Site]]] = {}
     for piece in pieces:
-        _, text, node, *_ = span(package, piece)
-        for site in sites(text, node, piece.partition("::")[2]):
+        text, node, _ = find(package, piece)
+        all_sites = Sites(text)
+        for site in all_sites.inside(node) if node else all_sites.in_toml(piece.partition("::")[2]):
             left.setdefault(site.kind, []).append((piece, site))
     while left:
         kind = rng.choice(sorted(left))
@@ -199,10 +193,8 @@ def draw(package: Path, pieces: list[str], seed: int, key: str) -> Iterator[Muta
 
 def mutant(package: Path, piece: str, site: Site) -> Mutant:
     """Apply a change to the text of its file."""
-    text = span(package, piece)[1]
+    text = find(package, piece).text
     new = text[: site.start] + site.new.encode() + text[site.end :]
     first, last = (text.count(b"\n", 0, k) for k in (site.start, site.end))
-    before, after = (
-        " ".join(x.strip() for x in t.decode().splitlines()[first : last + 1]) for t in (text, new)
-    )
+    before, after = (" ".join(x.strip() for x in t.decode().splitlines()[first : last + 1]) for t in (text, new))
     return Mutant(piece=piece, line=first + 1, before=before, after=after, text=new.decode())

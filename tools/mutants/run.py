@@ -1,5 +1,6 @@
-"""Run the tests of a requirement on a copy of the project into which a change was made."""
+"""Run tests on a copy of the project into which a change was made."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -10,7 +11,7 @@ from pathlib import Path
 TOOLS = Path(__file__).resolve().parents[1]
 COPIED = ("src", "tests", "pyproject.toml")
 #: a change may make a loop endless [s]
-PATIENCE = 120.0
+PATIENCE = 300
 #: a change that makes no assertion fail, but raises something else or runs for too long, proves nothing
 KILLED, SURVIVED, RAISED = "killed", "survived", "raised"
 
@@ -27,45 +28,58 @@ class Copy:
     """
 
     def __init__(self, root: Path, folder: Path) -> None:
-        self.folder = folder
-        self.package = folder / "src" / "thermocomp"
+        self.folder, self.package = folder, folder / "src" / "thermocomp"
         folder.mkdir()
-        for part in COPIED:
-            if (root / part).is_dir():
-                shutil.copytree(root / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
-            elif (root / part).exists():
-                shutil.copy(root / part, folder / part)
-        data = os.environ.get("THERMOCOMP_DATA", str(root.parent / "shared" / "data"))
-        self._environment = {
+        for part in filter(Path.exists, map(root.joinpath, COPIED)):
+            if part.is_dir():
+                shutil.copytree(part, folder / part.name, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                shutil.copy(part, folder)
+        self._noted = folder / "verdict.txt"
+        environment = {
+            "THERMOCOMP_DATA": str(root.parent / "shared" / "data"),
             **os.environ,
             "PYTHONPATH": os.pathsep.join(map(str, (folder / "src", TOOLS))),
-            "THERMOCOMP_DATA": data,
-            "HYPOTHESIS_PROFILE": "ci",
-            "MUTANT_VERDICT": str(folder / "verdict.txt"),
+            "HYPOTHESIS_PROFILE": "mutants",
+            "MUTANT_VERDICT": str(self._noted),
             "OMP_NUM_THREADS": "1",
             "OPENBLAS_NUM_THREADS": "1",
         }
+        self._forks = subprocess.Popen(
+            [sys.executable, "-m", "mutants.forks"],
+            cwd=folder,
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
 
-    def run(self, tests: Sequence[str], patience: float | None = None, *, compiled: str = "kernels") -> list[list[str]]:
-        """Run tests; return the outcome and the name of each, and ``raised`` at the end if pytest itself failed."""
-        noted = self.folder / "verdict.txt"
-        noted.unlink(missing_ok=True)
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "mutants.verdict", "--tb=no"]
-        environment = self._environment | {"NUMBA_CACHE_DIR": str(self.folder / compiled)}
-        try:
-            done = subprocess.run(
-                [*command, *(f"tests/{t}" for t in tests)],
-                cwd=self.folder,
-                env=environment,
-                capture_output=True,
-                timeout=patience,
-                check=False,
-            )
-            code = done.returncode
-        except subprocess.TimeoutExpired:
-            code = -1
-        lines = noted.read_text(encoding="utf-8").splitlines() if noted.exists() else []
-        return [line.split(" ", 1) for line in lines] + ([] if code in (0, 1, 2) and lines else [[RAISED, "pytest"]])
+    def close(self) -> None:
+        """End the process that runs the tests."""
+        self._forks.communicate()
+
+    def run(self, tests: Sequence[str], patience: int = 0, compiled: str = "kernels") -> list[list[str]]:
+        """Run tests; return the outcome and the name of each, and ``raised pytest`` if they could not be run.
+
+        Parameters
+        ----------
+        patience : int
+            Time limit [s]; 0: none.
+        compiled : str
+            Folder of compiled kernels.
+        """
+        self._noted.unlink(missing_ok=True)
+        assert self._forks.stdin and self._forks.stdout  # noqa: PT018
+        print(
+            json.dumps([[f"tests/{t}" for t in tests], patience, str(self.folder / compiled)]),
+            file=self._forks.stdin,
+            flush=True,
+        )
+        failed = int(self._forks.stdout.readline()) not in (0, 1, 2)
+        lines = self._noted.read_text(encoding="utf-8").splitlines() if self._noted.exists() else []
+        outcomes = [line.replace(" tests/", " ", 1).split(" ", 1) for line in lines]
+        return outcomes + ([[RAISED, "pytest"]] if failed or not lines else [])
 
     def judge(self, file: str, text: str, tests: Sequence[str]) -> tuple[str, str]:
         """Run tests with another text of a source file; return the verdict, and the test that killed or raised."""
@@ -75,13 +89,10 @@ class Copy:
         # numba looks at the file of a kernel only, not at those that it calls
         compiled = "changed" if "kernels/" in file else "kernels"
         try:
-            outcomes = self.run(tests, PATIENCE, compiled=compiled)
+            outcomes = self.run(tests, PATIENCE, compiled)
         finally:
             path.write_bytes(before)
             os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
             shutil.rmtree(self.folder / "changed", ignore_errors=True)
-        for verdict in (KILLED, RAISED):
-            for outcome, test in outcomes:
-                if outcome == verdict:
-                    return verdict, test.removeprefix("tests/")
-        return SURVIVED, ""
+        found = dict(reversed(outcomes))
+        return next(((v, found[v]) for v in (KILLED, RAISED) if v in found), (SURVIVED, ""))

@@ -5,15 +5,20 @@ import traceback
 from pathlib import Path
 
 import pytest
+from hypothesis import Phase, settings
+
+# as in CI, without a search for a simpler example
+PHASES = (Phase.explicit, Phase.generate)
+settings.register_profile(
+    "mutants", max_examples=50, deadline=None, derandomize=True, phases=PHASES, report_multiple_bugs=False
+)
 
 
 def asserted(error: BaseException) -> bool:
     """Return whether an assertion of a test failed: an `assert` in the package is not one."""
-    if isinstance(error, BaseExceptionGroup):  # of Hypothesis
-        return any(asserted(e) for e in error.exceptions)
     if not isinstance(error, AssertionError | pytest.fail.Exception):
         return False
-    return "/src/thermocomp/" not in traceback.extract_tb(error.__traceback__)[-1].filename.replace("\\", "/")
+    return "/src/thermocomp/" not in Path(traceback.extract_tb(error.__traceback__)[-1].filename).as_posix()
 
 
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> None:
