@@ -131,6 +131,15 @@ def test_figures_are_those_of_the_paper(study: tuple[Study, list[float]]) -> Non
     for figure in study[0].figures:
         for curve in (c for p in figure.panels for c in p.curves):
             assert curve.x.shape == curve.y.shape
+    curves = {f.key.removeprefix("wessel2004-"): [c for p in f.panels for c in p.curves] for f in study[0].figures}
+    # one test of the spindle; training and test of the tool; the days that are learned together, and the last one
+    rows = {"fig2a": 199, "fig3": 199, "fig5": 240, "fig6": 240, "fig7": 240, "fig8": 4 * 80, "fig9": 80}
+    assert {key: {len(c.x) for c in curves[key]} for key in rows} == {key: {n} for key, n in rows.items()}
+    for curve in curves["fig3"]:
+        np.testing.assert_allclose(curve.x, 100.0 / 3600.0 * np.arange(199))  # [h]
+    assert [p.xlabel.split(" ")[1] for p in fig2b.panels[:4]] == ["[um]", *["[degC]"] * 3]
+    theta, total, residual = (fig2b.panels[k].curves[0] for k in (0, 4, 5))
+    np.testing.assert_allclose(residual.y, theta.y - total.y)
 
 
 def test_progress_rises_and_numbers_are_finite(study: tuple[Study, list[float]]) -> None:
