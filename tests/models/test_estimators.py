@@ -15,7 +15,7 @@ from thermocomp.core.inputs import Input, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import lstsq
+from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
@@ -96,6 +96,10 @@ def test_statistics_are_those_of_the_residual(estimator: TermRegressor) -> None:
     )
     assert 1 <= m.n_effective_ <= len(y)
     assert len(m.coef_) == k
+    # five rows and five coefficients leave nothing to judge the fit by; a residual of zero repeats nothing
+    whole = LeastSquares().fit(np.random.default_rng(0).normal(size=(5, 4)), np.arange(5.0) ** 2)
+    assert np.isnan([whole.standard_error_, whole.adjusted_r_squared_]).all()
+    assert effective_sample_size(np.zeros(50)) == 50
 
 
 @pytest.mark.parametrize(
