@@ -105,6 +105,7 @@ def test_chen_dx_by_hand() -> None:
 
 def test_hwang_by_hand() -> None:
     assert at(hwang(), 10.0, 8.0, 3.0, 4.0) == pytest.approx(-46.2 + 65.0 + 10.4 - 31.2 + 26.8)
+    assert hwang().sensors == ("T7", "T8", "T2", "T6")
 
 
 @pytest.mark.parametrize(
