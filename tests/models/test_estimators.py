@@ -185,6 +185,7 @@ def test_log_text_in_the_style_of_systat() -> None:
     assert [(int(n), a.lower(), t) for n, a, t, *_ in steps] == [(s.number, s.action, s.term) for s in m.log_]
     for (*_, r, r2, f), s in zip(steps, m.log_, strict=True):
         assert float(r) == pytest.approx(s.r, abs=6e-4)
+        assert s.r == pytest.approx(np.sqrt(s.r_squared))
         assert float(r2) == pytest.approx(s.r_squared, abs=6e-4)
         assert float(f) == pytest.approx(s.f, rel=1e-3)
         assert not r.startswith("0")

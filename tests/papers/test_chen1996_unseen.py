@@ -128,7 +128,7 @@ def test_well_is_a_fifth_of_the_drift(share: float, holds: bool) -> None:
         f"RMS {rms:.1f} um; MRA {share * rms:.2f}, net {share * rms:.2f} ({share * rms:.2f}-{share * rms:.2f}) um"
         for rms in none
     ]
-    assert not unseen._bad((1 - unseen.WELL) * 5.0, 5.0)  # "at least"
+    assert not unseen._bad((1 - setup.WELL) * 5.0, 5.0)  # "at least"
 
 
 @pytest.mark.parametrize(
