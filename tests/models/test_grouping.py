@@ -241,6 +241,12 @@ def test_fewer_rows_than_variables(intercept: bool, most: int) -> None:
     np.testing.assert_allclose(
         [s.mse for s in found.curve], [m for m, _ in twin.curve(X, y, list(range(8)), intercept)], rtol=1e-8
     )
+    # one degree of freedom is enough for one variable
+    rng = np.random.default_rng(8)
+    rows = 2 + int(intercept)
+    assert (
+        len(exhaustive.search_subsets(tri(rng.normal(size=(rows, 3)), np.arange(rows), intercept), range(3)).curve) == 1
+    )
 
 
 def test_too_much_to_search() -> None:
