@@ -7,13 +7,14 @@ PYTEST ?=
 # each test worker uses one core: more threads of linear algebra would compete with the other worker
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
-.PHONY: help demo test test-long check bench docs verdicts count clean
+.PHONY: help demo test test-long check mutants bench docs verdicts count clean
 
 help:
 	@echo "make demo    the main workflow on the virtual machine: record, fit, evaluate on unseen cycles, report"
 	@echo "make test    the tests (installs what they need)"
 	@echo "make test-long   the long-running tests, and 2,000 random NC programs"
 	@echo "make check   format, lint, types, architecture"
+	@echo "make mutants change the code of each requirement of the papers, one place at a time: a test has to fail"
 	@echo "make bench   speed and accuracy compared with other packages"
 	@echo "make docs    the documentation, into docs/_build/html"
 	@echo "make verdicts    the papers' studies again, and their tables in the documentation"
@@ -38,6 +39,10 @@ check: $(VENV)/.dev
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# of the requirements whose code or tests have changed; MUTANTS="--all", or ids such as "C-15 H"
+mutants: $(VENV)/.dev
+	PYTHONPATH=tools $(BIN)/python -m mutants $(MUTANTS)
 
 # in a separate environment: the other packages require older libraries. Without R its packages are omitted.
 bench: $(BENCH)/.bench

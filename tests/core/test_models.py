@@ -104,6 +104,9 @@ def test_support_policies(policy: str, expected: list[float]) -> None:
     values = run(model, [[20.0], [25.0], [31.0], [32.5], [50.0], [24.0]], 1.0)
     assert values[:2] == [0.0, 10.0]
     assert values[2:] == pytest.approx(expected)
+    # two independent runs together, of which one leaves the range
+    state, _ = model.step(model.init([20.0]), np.array([[25.0], [25.0]]), 0.0)
+    assert model.step(state, np.array([[31.0], [24.0]]), 1.0)[1].tolist() == pytest.approx([expected[0], 8.0])
 
 
 def test_margin_widens_the_trained_range() -> None:

@@ -1,5 +1,7 @@
 """Models from the papers' printed coefficients, loaded, written, read back and evaluated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,12 +97,15 @@ def test_chen_dx_by_hand() -> None:
         -0.586 * t2 + 7.527 * t3 - 36.966 * d67 + 10.809 * d89 - 0.149 * t3**2 - 18.119 * d67**2 + 2.499 * t2 * d67
     )
     assert at(chen_dx(), t2, t3, t6, t7, t8, t9) == pytest.approx(expected, rel=1e-14)
+    ones = replace(chen_dx(), coefficients=(1.0,) * 7)
+    assert at(ones, t2, t3, t6, t7, t8, t9) == pytest.approx(t2 + t3 + d67 + d89 + t3**2 + d67**2 + t2 * d67, rel=1e-14)
     assert len(chen_dx().terms) == 7  # C-20
     assert at(chen_dx(), *[0.0] * 6) == 0.0  # no constant, C-09
 
 
 def test_hwang_by_hand() -> None:
     assert at(hwang(), 10.0, 8.0, 3.0, 4.0) == pytest.approx(-46.2 + 65.0 + 10.4 - 31.2 + 26.8)
+    assert hwang().sensors == ("T7", "T8", "T2", "T6")
 
 
 @pytest.mark.parametrize(

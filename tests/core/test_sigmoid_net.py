@@ -62,6 +62,11 @@ def test_evaluate_is_the_sum_written_out(hidden: str, output: str) -> None:
         for weights, th in zip(n.output_weights, n.output_thresholds, strict=True)
     ]
     assert n.evaluate(np.array(x)).tolist() == pytest.approx(out, rel=1e-13)
+    # in a frozen model, between the two scalings
+    m = model(net=net(9, 4, 1, hidden=hidden, output=output))
+    change = np.linspace(-4.0, 18.0, 9)
+    deviation = m.step(m.init([20.0] * 9), 20.0 + change, 0.0)[1]
+    assert deviation == pytest.approx(100.0 * m.net.evaluate(0.032 * change + 0.26)[0] - 30.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(("shape", "parameters"), [((9, 20, 3), 263), ((5, 8, 1), 57)])

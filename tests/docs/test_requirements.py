@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from mutants.draw import draw
+
 ROOT = Path(__file__).resolve().parents[2]
 #: requirements per paper
 COUNTS = {"C": 38, "W": 15, "H": 19, "P": 7, "T": 10, "X": 3}
 GROUPS = tomllib.loads((ROOT / "docs" / "requirements.toml").read_text(encoding="utf-8"))
+CODE = tomllib.loads((ROOT / "docs" / "requirements_code.toml").read_text(encoding="utf-8"))
 ENTRIES = {key: entry for group in GROUPS.values() for key, entry in group.items() if key != "title"}
 
 
@@ -46,3 +49,24 @@ def test_what_covers_it_is_there(key: str) -> None:
         assert name in functions(file), f"{key}: there is no {test}"
     if "study" in entry:
         assert key in claimed(entry["study"]), f"{key}: the study {entry['study']} has no claim of it"
+
+
+def test_its_code_is_named() -> None:
+    assert [*CODE["code"]] == [key for key, entry in ENTRIES.items() if "tests" in entry]
+
+
+@pytest.mark.parametrize("key", CODE["code"])
+def test_its_code_is_there_and_can_be_changed(key: str) -> None:
+    assert len({*CODE["code"][key]}) == len(CODE["code"][key])
+    assert len([*draw(ROOT / "src" / "thermocomp", CODE["code"][key], 0, key)]) > 2
+
+
+def test_changes_without_effect_are_those_of_the_code() -> None:
+    drawn = {
+        (m.piece, m.before, m.after)
+        for key in CODE["code"]
+        for m in draw(ROOT / "src" / "thermocomp", CODE["code"][key], 0, key)
+    }
+    for entry in CODE.get("equivalent", ()):
+        assert (entry["piece"], entry["before"], entry["after"]) in drawn, entry
+        assert len(entry["reason"]) > 20

@@ -160,7 +160,7 @@ def test_stop_rules() -> None:
     assert len(ACE(max_sweeps=3).fit(T, y).errors_) == 3
     limit = ACE(converged=True, tolerance=1e-7, max_sweeps=5000).fit(T, y)
     assert ACE(converged=True, tolerance=1e-4).fit(T, y).psi_ == pytest.approx(limit.psi_, abs=1e-5)
-    assert len(limit.errors_) < 2000
+    assert len(limit.errors_) < 30  # of sweeps that are not accelerated; of those of the opposite sign, 54
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 10])

@@ -81,6 +81,11 @@ def test_sets_equivalent_for_all_displacements() -> None:
                 assert found.p_values[d, k] == pytest.approx(p, rel=1e-6)
                 assert found.equivalent[d, k] == (p > 0.05)
     assert set(found.common) == {s for k, s in enumerate(subsets) if all(found.p_values[d, k] > 0.05 for d in range(3))}
+    # whichever of two sets is the better one
+    differences = np.random.default_rng(4).normal(0.4, 1.0, (6, 23))
+    for sign in (1, -1):
+        expected = [stats.wilcoxon(sign * d).pvalue for d in differences]
+        np.testing.assert_allclose(signed_rank_p(sign * differences), expected, rtol=1e-9)
 
 
 def test_table() -> None:
@@ -161,4 +166,5 @@ def test_number_of_sensors_that_is_enough() -> None:
     found = MaximalCorrelations(np.array(psi), tuple(tuple(s) for s in subsets), ("",) * psi[0].shape[1], complete=True)
     assert found.least_size(0.99) == 3
     assert found.least_size(0.97) == 2
+    assert replace(found, psi=np.full_like(found.psi, 0.75)).least_size(0.75) == 1  # at least so much
     assert replace(found, psi=np.array([*psi, psi[0] - 0.05])).least_size(0.99) is None

@@ -15,7 +15,7 @@ from thermocomp.core.inputs import Input, Support
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.dynamic import DynamicRidge
 from thermocomp.models.linear import TermRegressor
-from thermocomp.models.numerics.leastsquares import lstsq
+from thermocomp.models.numerics.leastsquares import effective_sample_size, lstsq
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.partial_f import PartialF
 from thermocomp.models.second_order import SecondOrderRegression
@@ -96,6 +96,10 @@ def test_statistics_are_those_of_the_residual(estimator: TermRegressor) -> None:
     )
     assert 1 <= m.n_effective_ <= len(y)
     assert len(m.coef_) == k
+    # five rows and five coefficients leave nothing to judge the fit by; a residual of zero repeats nothing
+    whole = LeastSquares().fit(np.random.default_rng(0).normal(size=(5, 4)), np.arange(5.0) ** 2)
+    assert np.isnan([whole.standard_error_, whole.adjusted_r_squared_]).all()
+    assert effective_sample_size(np.zeros(50)) == 50
 
 
 @pytest.mark.parametrize(
@@ -181,6 +185,7 @@ def test_log_text_in_the_style_of_systat() -> None:
     assert [(int(n), a.lower(), t) for n, a, t, *_ in steps] == [(s.number, s.action, s.term) for s in m.log_]
     for (*_, r, r2, f), s in zip(steps, m.log_, strict=True):
         assert float(r) == pytest.approx(s.r, abs=6e-4)
+        assert s.r == pytest.approx(np.sqrt(s.r_squared))
         assert float(r2) == pytest.approx(s.r_squared, abs=6e-4)
         assert float(f) == pytest.approx(s.f, rel=1e-3)
         assert not r.startswith("0")

@@ -188,6 +188,19 @@ def test_the_whole_way_follows_the_paper(seed: int, intercept: bool) -> None:
     assert found.members.best.mse == pytest.approx(best, rel=1e-8)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_rounding_is_told_from_a_small_remainder(seed: int) -> None:
+    # H-04, H-05: what is left after the first regression is nothing, or small; of equally good variables the first is
+    # chosen; a constant one explains nothing
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(32, 5)) * [1.0, 1e-6, 1.0, 1.0, 0.0] + 5
+    y, groups = 1e6 * X[:, 0], ((0, 1), (2, 3), (4,))
+    assert grouping.representatives(tri(X, y), groups) == (0, 2, 4)
+    assert grouping.representatives(tri(X, y + 1e-5 * X[:, 3]), groups) == (0, 3, 4)
+    found = exhaustive.search_subsets(tri(X[:, :4], y), range(4))
+    assert (found.best.columns, found.best.mse) == ((0,), 0.0)
+
+
 def test_sensors_that_almost_repeat_each_other() -> None:
     # the sums of squares must be those of extended precision, where normal equations would have no digit left
     rng = np.random.default_rng(3)
@@ -227,6 +240,12 @@ def test_fewer_rows_than_variables(intercept: bool, most: int) -> None:
     assert [len(s.columns) for s in found.curve] == list(range(1, most + 1))
     np.testing.assert_allclose(
         [s.mse for s in found.curve], [m for m, _ in twin.curve(X, y, list(range(8)), intercept)], rtol=1e-8
+    )
+    # one degree of freedom is enough for one variable
+    rng = np.random.default_rng(8)
+    rows = 2 + int(intercept)
+    assert (
+        len(exhaustive.search_subsets(tri(rng.normal(size=(rows, 3)), np.arange(rows), intercept), range(3)).curve) == 1
     )
 
 
@@ -295,3 +314,4 @@ def test_contributions() -> None:
     found = contributions(X, y)
     np.testing.assert_allclose(found[:2], [np.corrcoef(X[:, k], y)[0, 1] for k in (0, 1)], atol=1e-11)
     assert np.isnan(found[2])
+    assert np.isnan(contributions(X, np.ones(50))).all()  # nothing contributes to what does not change

@@ -46,6 +46,7 @@ def test_scaling_per_channel_and_common() -> None:
     assert (common[:, 2] == 0.5).all()
     low, high = y.min(keepdims=True), y.max(keepdims=True)
     np.testing.assert_allclose(scaling_out(low, high)(scaling_in(low, high)(y[:, None]))[:, 0], y, rtol=1e-13)
+    assert (scaling_out(low, low)(np.array([[0.1], [0.5], [0.9]])) == low).all()  # a constant channel keeps its value
 
 
 def test_thinning_is_even() -> None:
@@ -189,6 +190,7 @@ def test_sweep_over_the_hidden_nodes() -> None:
     assert said[0] == f"1 hidden nodes: RMS {tried[0].mean:.4g} in 4 thermal cycles, left out in turn"
     assert all(len(t.rms) == 4 for t in tried)
     best = min(tried, key=lambda t: t.mean)
+    assert best.standard_error == pytest.approx(np.std(best.rms) / np.sqrt(4 - 1))
     assert fitted.n_hidden_ == next(t.n_hidden for t in tried if t.mean <= best.mean + best.standard_error)
     assert fitted.net_.shape == (9, fitted.n_hidden_, 1)
     # the first fold of the second count, done by hand

@@ -9,6 +9,7 @@ from profilemachine import EQ6, LAW, along_y, planted, profiles, states
 
 from thermocomp.core.exceptions import FitError, InputError, RecordingError
 from thermocomp.core.lineardynamic import LinearDynamic
+from thermocomp.core.profile import PolynomialProfile
 from thermocomp.models.ols import LeastSquares
 from thermocomp.models.second_order import SecondOrderRegression
 from thermocomp.papers.chen1996.law import OURS, plant, temperatures
@@ -90,6 +91,11 @@ def test_a_profile_of_two_coordinates() -> None:
     assert found.order == (5, 1)
     between = np.array([[150.0, 275.0, 0.0], [450.0, 80.0, 99.0]])
     np.testing.assert_allclose(found.profile.at(between), truth(between), atol=0.15)
+    # three positions of X determine no more than a parabola
+    given = fit_profile(points, values, "Y", order=(5, 9)).profile
+    assert isinstance(given, PolynomialProfile)
+    assert max(e[0] for e in given.exponents) == 2
+    assert max(e[1] for e in given.exponents) == 5
     alone = fit_profile(points, values, "Y", coordinates="Y")
     assert alone.order[1] == 0
     assert off(alone.profile.at(points), truth(points)) > 0.7

@@ -93,6 +93,21 @@ def test_figures_like_the_papers(study: Study) -> None:
             assert panel.xlabel
             assert panel.ylabel
             assert all(len(c.x) == len(c.y) > 1 and c.label for c in panel.curves)
+    panels = {int(f.key.removeprefix("chen1996-fig")): f.panels[0] for f in study.figures if "-fig" in f.key}
+    assert [panels[k].ylabel for k in (3, 4, 5, 10, 11, 12)] == [f"{t} [um]" for t in "xyzxyz"]
+    assert [panels[k].ylabel for k in (14, 15, 16, 17)] == [f"{t} [um]" for t in "zzzx"]
+    for number, (hours, models) in {
+        **dict.fromkeys((3, 4, 5), (5 * 16.1, [MRA])),
+        **dict.fromkeys((10, 11, 12), (5 * 16.1, [NET])),
+        **{7: (50 / 3, [MRA]), 13: (50 / 3, [NET]), 15: (9.05, [MRA, NET, DYNAMIC])},
+        **dict.fromkeys((14, 16, 17), (12.1, [MRA, NET, DYNAMIC])),
+    }.items():
+        assert [c.label for c in panels[number].curves] == ["measured", *models]
+        for curve in panels[number].curves:
+            assert (curve.x[0], curve.x[-1]) == (0.0, pytest.approx(hours))
+    for number in (1, 6):  # profiles in several states, from the cold machine to the end of the test
+        labels = [c.label for c in panels[number].curves]
+        assert (len(labels), labels[0], labels[-1]) == (6, "after 0.0 h", "after 16.7 h")
     captions = [t.caption for t in study.tables]
     assert any(c.startswith("Fig. 2") for c in captions)
     assert any(c.startswith("Table 1") for c in captions)

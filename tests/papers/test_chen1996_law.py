@@ -107,6 +107,7 @@ def test_a_net_tells_no_law(sought: Law) -> None:
     assert (sought.net.n_parameters_, sought.net.n_patterns_) == (57, 51)
     assert "57 weights" in sought.net.caution_
     assert sought.net_r2 > 0.9
+    assert {design: len(r.found) for design, r in sought.recoveries.items()} == dict.fromkeys(DESIGNS, 10) | {OURS: 20}
     assert sought.idle > 0.3
     assert sought.elsewhere["MRA"] < 0.1 * sought.elsewhere["law"]
     assert sought.elsewhere["net"] > 2 * sought.elsewhere["MRA"]

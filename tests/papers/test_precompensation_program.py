@@ -170,6 +170,8 @@ def test_a_surface_is_what_is_commanded_plus_the_drift_at_its_time_and_place() -
     face = program.FacedSurface(1, 300.0, np.array([30.0, 600.0]), np.array([-4.0, -5.0]))
     # 300 mm lies in the middle of two positions; -5 um is 5e-6 of the way to the next one
     assert face.surface(truth) == pytest.approx([-4 + 3 + 0.5, -5 + 3 + 10], abs=1e-3)
+    deep = program.FacedSurface(1, 300.0, np.array([30.0]), np.array([-1e5]))  # 100 mm lower
+    assert deep.surface(truth) == pytest.approx([-1e5 + 2 + 0.5], abs=1e-3)
 
 
 def test_a_pass_that_climbs_is_looked_at_all_along() -> None:

@@ -137,6 +137,17 @@ def test_figures_are_those_of_the_paper(study: tuple[Study, list[float]]) -> Non
     for figure in study[0].figures:
         for curve in (c for p in figure.panels for c in p.curves):
             assert curve.x.shape == curve.y.shape
+    curves = {f.key.removeprefix("wessel2004-"): [c for p in f.panels for c in p.curves] for f in study[0].figures}
+    # one test of the spindle; training and test of the tool; the days that are learned together, and the last one
+    rows = {"fig2a": 199, "fig3": 199, "fig5": 240, "fig6": 240, "fig7": 240, "fig8": 4 * 80, "fig9": 80}
+    assert {key: {len(c.x) for c in curves[key]} for key in rows} == {key: {n} for key, n in rows.items()}
+    (fig3,) = [f for f in study[0].figures if f.key.endswith("fig3")]
+    assert "S2" in fig3.panels[1].ylabel  # the last displacement, at the tip
+    for curve in curves["fig3"]:
+        np.testing.assert_allclose(curve.x, 100.0 / 3600.0 * np.arange(199))  # [h]
+    assert [p.xlabel.split(" ")[1] for p in fig2b.panels[:4]] == ["[um]", *["[degC]"] * 3]
+    theta, total, residual = (fig2b.panels[k].curves[0] for k in (0, 4, 5))
+    np.testing.assert_allclose(residual.y, theta.y - total.y)
 
 
 def test_progress_rises_and_numbers_are_finite(study: tuple[Study, list[float]]) -> None:
@@ -370,7 +381,9 @@ def test_the_worst_episode_is_left_out() -> None:
 def test_over_and_under_estimates_go_by_the_drift() -> None:
     found = judged(lambda x: (np.where(x <= 40, -1.0, 1.0), np.ones(100)))
     towards = float(np.sign(found.measured.mean()))
-    found.estimates[MLR_NAME] = found.measured + towards * np.repeat([-50.0, 1.0, 50.0, -1.0], [9, 31, 19, 41])
+    found.estimates[MLR_NAME] = found.measured + towards * np.repeat(
+        [-50.0, 16.0, 0.5, 50.0, -21.0, -0.5], [9, 1, 30, 19, 1, 40]
+    )
     (c,) = wessel2004_tools.milling.judged("systematic", found)
     assert c.holds
     assert c.ours.startswith("mean excess +1.00 um between them, -1.00 um")

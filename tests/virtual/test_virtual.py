@@ -2,7 +2,7 @@
 
 import re
 from functools import cache
-from itertools import combinations
+from itertools import combinations, groupby
 
 import numpy as np
 import pytest
@@ -107,6 +107,16 @@ def test_chen_protocol() -> None:
     assert (rpm[:, :10] > 0).all()
     assert (rpm[:, 10:] == 0).all()
     assert len(set(rpm[:, 0])) > 4
+
+
+def test_stepwise_protocol() -> None:
+    """T-01: 24 temperatures at different places, the error of X; four speeds, the machine cools down after each."""
+    (test,) = simulated("stepwise2017")
+    assert len({*names(test, "temperature")}) == 24
+    assert names(test, "displacement") == ["x1_um"]
+    runs = [(speed, len([*rows]) / 12) for speed, rows in groupby(column(test, "spindle_rpm")[1:].tolist())]
+    assert runs == [(0, 0.5), (1500, 3.5), (0, 2.5), (3000, 3.5), (0, 2.5), (800, 3.5), (0, 2.5), (2200, 3.5), (0, 2.5)]
+    assert test.time[1] == HOUR / 12
 
 
 def test_hwang_protocol() -> None:
