@@ -118,6 +118,12 @@ def test_on_the_grid_it_is_the_equation() -> None:
     assert got[0] == 0.0
 
 
+def test_orders_are_those_of_the_equation() -> None:
+    """P-01: two past drifts, and three values of the speed, which are two past ones and the present."""
+    assert linear(A, B[:1]).orders == (2, 2)
+    assert linear((0.5,), B).orders == (1, 2)
+
+
 def test_jitter_does_not_matter() -> None:
     """Readings at 14.9 s and 15.1 s: the ticks come on time, and no tick is lost or made twice."""
     time = H * np.arange(400)

@@ -159,6 +159,13 @@ def test_rounding_of_a_clock_is_no_jitter() -> None:
         assert np.array_equal(rounded.drive, exact.drive)
 
 
+def test_before_the_start_there_was_no_drift() -> None:
+    """P-05: the first displacement counts as the past of the next ticks; what was before it is zero."""
+    own, drive = np.array([1.0, 2.0, 3.0]), np.array([[10.0], [20.0], [30.0]])
+    found = ticks.regressors(own, drive, np.array([0, 1, 2]), 2, 0, drive)
+    np.testing.assert_array_equal(found, [[0.0, 0.0, 10.0], [1.0, 0.0, 20.0], [2.0, 1.0, 30.0]])
+
+
 def test_displacements_are_not_interpolated_over_gaps() -> None:
     dt = np.array([np.inf, 60.0, 60.0, 600.0, 60.0, 60.0, 30.0, 60.0])
     y: FloatArray = np.linspace(0.0, 7.0, 8)

@@ -248,6 +248,13 @@ def test_an_exact_fit_ends_it() -> None:
     assert run(X, np.full(300, 2.5), AlphaThresholds(0.5, 0.5)).steps == ()
 
 
+def test_a_small_remainder_is_no_exact_fit() -> None:
+    """T-04: F decides whatever is left of y, unless it is rounding."""
+    X = np.random.default_rng(15).normal(size=(200, 3))
+    found = run(X, X[:, 0] + 1e-9 * X[:, 2], FThresholds(100.0, 50.0))
+    assert found.selected == (0, 2)
+
+
 def test_more_candidates_than_rows() -> None:
     rng = np.random.default_rng(14)
     X = rng.normal(size=(20, 60))

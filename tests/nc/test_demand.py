@@ -37,6 +37,23 @@ def test_every_ten_minutes_it_stays_in_between() -> None:
     assert seen == [-25.0] * 10 + [-85.0] * 10 + [-145.0] * 10 + [-205.0]
 
 
+def test_a_small_change_is_taken_when_it_is_due() -> None:
+    """P-06: what is computed after ten minutes counts, also below the tolerance by which others are renewed."""
+    drift, demand = _Set(3.0), Demand(1.0, every=600.0)
+    assert demand.at(0.0, drift, HERE)[2] == -3.0
+    drift.z = 3.4
+    assert demand.at(599.0, drift, HERE)[2] == -3.0
+    assert demand.at(600.0, drift, HERE)[2] == -3.4
+
+
+def test_a_drift_that_changes_its_sign_is_followed() -> None:
+    """P-06, E-P4: the correction is minus the deviation, so one of the same sign is as wrong as can be."""
+    drift, demand = _Set(3.0), Demand(1.0)
+    assert demand.at(0.0, drift, HERE)[2] == -3.0
+    drift.z = -2.5
+    assert demand.at(1.0, drift, HERE)[2] == 2.5
+
+
 def test_between_the_times_it_follows_the_place() -> None:
     drift, demand = Growing(), Demand(1.0, every=600.0)
     assert demand.at(0.0, drift, HERE) == (-3.0, 5.0, -25.0)
@@ -44,7 +61,7 @@ def test_between_the_times_it_follows_the_place() -> None:
     assert demand.at(300.0, drift, (0.0, 0.0, 100.0)) == (-5.0, 5.0, -27.0)
 
 
-class _Mad(Steady):
+class _Set(Steady):
     def __init__(self, z: float) -> None:
         self.z = z
 
@@ -58,4 +75,4 @@ class _Mad(Steady):
 @pytest.mark.parametrize("every", [None, 60.0])
 def test_what_is_no_thermal_drift_is_refused(z: float, said: str, every: float | None) -> None:
     with pytest.raises(InputError, match=said):
-        Demand(1.0, every).at(0.0, _Mad(z), HERE)
+        Demand(1.0, every).at(0.0, _Set(z), HERE)
