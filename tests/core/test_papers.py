@@ -108,6 +108,17 @@ def test_hwang_by_hand() -> None:
     assert hwang().sensors == ("T7", "T8", "T2", "T6")
 
 
+def test_hwang_without_grouping_by_hand() -> None:
+    """H-15, Eq. 8: seven variables."""
+    names = ["T1", "T2", "T7", "T9", "T10", "T11", "T12"]
+    printed = (22.6, -16.5, 7.9, -25.8, 45.4, -36.1, 13.0)
+    terms: dict[Term, float] = {(k,): c for k, c in enumerate(printed)}
+    variables = [Variable.single(name, k) for k, name in enumerate(names)]
+    model = paper_model("z", names, variables, terms, "Hwang, Lee, Yang, Eq. 8", intercept=-50.7)
+    expected = -50.7 + 22.6 * 3 - 16.5 * 2 + 7.9 * 9 - 25.8 * 4 + 45.4 * 5 - 36.1 * 6 + 13.0 * 7
+    assert at(model, 3.0, 2.0, 9.0, 4.0, 5.0, 6.0, 7.0) == pytest.approx(expected)
+
+
 @pytest.mark.parametrize(
     ("y", "um"), [(0.0, 0.24), (50.0, 8.48), (100.0, 7.74), (250.0, -2.24), (500.0, -15.83), (550.0, -18.53)]
 )

@@ -198,6 +198,17 @@ def test_alpha_to_enter_above_alpha_to_remove_is_refused(alphas: tuple[float, fl
         AlphaThresholds(*alphas)
 
 
+def test_a_term_whose_f_is_the_threshold_stays() -> None:
+    """T-06: deleted are terms whose F is below the threshold, as the first one when both of its parts have entered."""
+    rng = np.random.default_rng(16)
+    parts = rng.normal(size=(300, 2))
+    X = np.column_stack([parts.sum(axis=1) + 0.5 * rng.normal(size=300), parts])
+    y = parts.sum(axis=1) + 0.3 * rng.normal(size=300)
+    found = run(X, y, FThresholds(10.0, 9.0))
+    assert [(s.action, s.index) for s in found.steps[:1] + found.steps[-1:]] == [("enter", 0), ("remove", 0)]
+    assert run(X, y, FThresholds(10.0, found.steps[-1].f)).selected == (0, 1, 2)
+
+
 def test_a_rule_that_goes_round_is_stopped() -> None:
     class Fickle(FThresholds):
         def enter_f(self, df: int) -> float:

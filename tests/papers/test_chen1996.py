@@ -302,6 +302,8 @@ def test_profiles_are_those_of_the_test(slopes: LearnedPositioning) -> None:
     (panel,) = figure.panels
     np.testing.assert_array_equal(panel.curves[0].y, slopes.yaw.values[0])
     assert panel.ylabel == "yaw of Y [urad]"
+    metres, change = slopes.yaw.position / 1000.0, slopes.yaw.values - slopes.yaw.values[0]
+    assert f"varies by {np.ptp(np.polyfit(metres, change.T, 1)[0]):.1f} urad/m" in figure.caption
 
 
 def test_the_cold_profile_is_a_polynomial_of_fifth_order(slopes: LearnedPositioning) -> None:

@@ -148,6 +148,7 @@ def test_one_table_of_all(recording: Recording) -> None:
     (panel,) = study.figures[0].panels
     assert panel.curves[0].label == "ols"
     assert panel.curves[0].y[0] == pytest.approx(ratio)
+    assert panel.curves[0].x.tolist() == [1.0, 2.0, 3.0, 4.0]
 
 
 def test_a_method_that_does_harm_is_a_finding() -> None:

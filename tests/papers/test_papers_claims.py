@@ -112,16 +112,25 @@ def test_a_claim_without_its_premise_is_not_testable(
     assert (claim.holds, claim.testable) == ({"yes": True, "no": False}.get(verdict), verdict != "not testable")
 
 
-@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0)])
-def test_a_claim_that_one_run_cannot_test_is_not_testable(order: tuple[int, ...]) -> None:
-    runs = [
-        Claim(("W-08",), "Better", "", "1", None, "Nothing to compare.", testable=False),
-        Claim(("W-08",), "Better", "", "1", True),
-        Claim(("W-08",), "Better", "", "1", False, "It is not."),
-    ]
-    joined = _known(runs[order[0]], [[runs[k]] for k in order[1:]], seed=0)
-    assert (joined.verdict, joined.holds) == ("not testable", None)
-    assert "Nothing to compare." in joined.finding
+@pytest.mark.parametrize(
+    ("runs", "verdict"),
+    [
+        ((None, None, None), "not testable"),
+        ((None, False, False), "no"),
+        ((False, False, None), "no"),
+        ((True, True, None), "2 of 3"),
+        ((None, True, False), "1 of 3"),
+        ((True, True, True), "yes"),
+    ],
+)
+def test_a_run_that_cannot_test_a_claim_hides_no_failure(runs: tuple[bool | None, ...], verdict: str) -> None:
+    untested = Claim(("W-08",), "Better", "", "1", None, "Nothing to compare.", testable=False)
+    made = {None: untested, True: Claim(("W-08",), "Better", "", "1", True)}
+    made[False] = Claim(("W-08",), "Better", "", "1", False, "It is not.")
+    first, *others = (made[holds] for holds in runs)
+    joined = _known(first, [[c] for c in others], seed=0)
+    assert joined.verdict == verdict
+    assert ("Nothing to compare." in joined.finding) is (None in runs)
 
 
 @pytest.mark.parametrize(

@@ -141,6 +141,8 @@ def test_the_verification_is_another_recording(monkeypatch: pytest.MonkeyPatch) 
     # what is judged is the drift of the second test, and least squares predicts it without having seen it
     np.testing.assert_array_equal(c.left[precompensation_setup.NONE], c.judge.deviations)
     assert c.errors[precompensation_setup.LEAST].rms < 0.1 * c.errors[precompensation_setup.NONE].rms
+    left = c.judge.deviations - at_positions(c.models[precompensation_setup.NET], c.judge)
+    assert c.workshop == pytest.approx(rms(left))  # this machine knows no room: that of the workshop is the same
     warm = precompensation_setup.warm_start(c.judge, c.models[precompensation_setup.NET][0])
     np.testing.assert_array_equal(c.warm.carried, warm.carried)
     fitted = at_positions(c.models[precompensation_setup.LEAST], c.learn)

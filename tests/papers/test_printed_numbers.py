@@ -82,6 +82,7 @@ PRINTED = (
     Printed("wessel2004.sets.PAPER_SMALL_SETS", 129, "W-10", "Appendix B, at most three locations"),
     Printed("wessel2004.sets.ENOUGH_PSI", 0.99, "W-12", "Appendix B: triples > 0.99"),
     Printed("wessel2004.sets.MOST", 3, "W-12", "Appendix B: at most three locations"),
+    Printed("wessel2004.spindle.PAPER_PSI", 0.9994, "W-06", "section III"),
     Printed("wessel2004.spindle.GOOD_PSI", 0.99, "W-12", "Appendix B: triples > 0.99"),
     Printed("wessel2004.spindle.NEIGHBOURS", range(1, 10 + 1), "W-05", "section III: k = 1, ..., 10"),
     Printed("wessel2004.tools.AT_REST", 5.7 / 1.0, "W-08", "section IV: 5.7 um, by ACE 1.0 um"),
@@ -98,6 +99,8 @@ PRINTED = (
         "Table 1, groups 1 to 8",
     ),
     Printed("hwang.setup.PAPERS_SHARE", 4 / 8, "H-11", "section 3.2.1 and Table 1: four of eight groups"),
+    Printed("hwang.setup.PAPERS_VARIABLES", (7, 4), "H-15", "Eq. 8 and Eq. 6"),
+    Printed("hwang.setup.PAPERS_ERRORS", (6.39, 6.72), "H-12 H-13", "Table 2 [um]"),
     Printed("hwang.setup.JUDGEMENT", ("T6", "T7", "T13"), "H-13", "Table 2, right column, beside the squares"),
     Printed("hwang.setup.DRAWS", 100, "H-18", "section 3.2.4"),
     Printed("hwang.setup.INTERVAL", 30 * 60, "H-09", "section 3.1: every 30 min [s]"),
@@ -188,7 +191,6 @@ CLAIMED: dict[str, str] = {
     "chen1996.part.lateral": "92.4 7.2",  # C-37, conclusion 5
     "chen1996.part.depth": "196 8",  # C-37, conclusion 5
     "wessel2004.spindle.series": "199 100",  # W-06, section III
-    "wessel2004.spindle.fits": "0.9994",  # W-06, section III
     "wessel2004.sets.calculated": "511 35259 129",  # W-10, Appendix B
     "wessel2004.sets.several": "46 7 27 1 2 3 4 1 2 8 2 4 8 2 5 8 2 8 9",  # W-11, Appendix B
     "wessel2004.sets.shared": "2 8",  # W-11, Appendix B

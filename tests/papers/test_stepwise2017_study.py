@@ -15,6 +15,7 @@ from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017 import setup as stepwise2017_setup
 from thermocomp.papers.study import Claim, Study, tell_nobody
 from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.stacking import stack
 from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]
@@ -86,6 +87,13 @@ def test_a_drift_of_two_temperatures(monkeypatch: pytest.MonkeyPatch) -> None:
     assert needed[-1] == pytest.approx(100 / (100 + float(study.tables[2].rows[-1][0]) - 2), abs=0.005)
 
 
+def test_what_a_first_temperature_has_to_explain() -> None:
+    """T-07, E-T3: F_E = 100 with n - 2 degrees of freedom."""
+    warm = stack(_of("stepwise2017", 0, few=True), ["x1_um"])
+    found = stepwise2017_setup._thinned(warm, warm, 4)
+    assert found.first == pytest.approx(100 / (100 + found.rows - 2), rel=1e-12)
+
+
 @pytest.mark.usefixtures("quick")
 def test_a_drift_of_many_temperatures_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """T-07 can fail: here eight temperatures count."""
@@ -136,13 +144,14 @@ def test_the_exported_program_predicts_as_the_model(monkeypatch: pytest.MonkeyPa
     assert np.ptp(found) > 10
 
 
-@pytest.mark.parametrize(("size", "holds"), [(6.0, False), (4.0, True)])
-def test_the_bound_is_five_um(size: float, holds: bool) -> None:
-    """T-08: of a drift of 30 um everything is left but one reading, which stays within the bound or not."""
-    x = np.linspace(0.0, 30.0, 60)
+@pytest.mark.parametrize(("size", "holds", "drift"), [(6.0, False, 30.0), (4.0, True, 30.0), (4.0, True, 9.0)])
+def test_the_bound_is_five_um(size: float, holds: bool, drift: float) -> None:
+    """T-08: of a drift everything is left but one reading, which stays within the bound or not."""
+    x = np.linspace(0.0, drift, 60)
     left = np.where(np.arange(60) == 30, size, 0.5)
     errors = {stepwise2017_setup.NONE: Errors.of(x)}
     fitted = Errors.of(left)
     found = SimpleNamespace(errors=errors, left_exported=left, on_dsp=fitted, fitted=fitted, exported_by="C")
     (claim,) = stepwise2017.claims.judged("bounded", found)  # type: ignore[arg-type]
     assert claim.holds is holds
+    assert ("this proves little" in claim.finding) is (drift < 10.0)

@@ -98,13 +98,16 @@ def not_redone(name: str, why: str) -> Study:
 
 
 def _known(claim: Claim, others: Sequence[Sequence[Claim]], seed: int) -> Claim:
-    """Return a claim with the outcome of its other runs, and the finding where it does not hold."""
-    same = [c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text)]
-    worse = [(k, c) for k, c in enumerate(same, start=1) if c.holds is False or c.softer > claim.softer]
-    otherwise = f"Seed {seed + APART * worse[0][0]}: {worse[0][1].finding}" if claim.holds and worse else ""
-    finding = " ".join(text for text in (claim.finding, otherwise) if text)
-    untestable = [f"Seed {seed + APART * k}: {c.finding}" for k, c in enumerate(same, start=1) if not c.testable]
-    if claim.testable and untestable:
-        return replace(claim, finding=untestable[0], holds=None, softer=False, testable=False)
-    again = tuple(c.holds for c in same if c.holds is not None)
-    return replace(claim, finding=finding, again=again, softer=any(c.softer for c in (claim, *same)))
+    """Return a claim with the outcome of its other runs, and the finding where it does not hold.
+
+    A run that cannot test the claim counts as one in which it does not hold, unless no run can test it.
+    """
+    runs = [claim, *(c for claims in others for c in claims if (c.ids, c.text) == (claim.ids, claim.text))]
+    first = next((k for k, c in enumerate(runs) if c.testable), 0)
+    base = runs[first]
+    told = [k for k, c in enumerate(runs) if k != first and not c.testable] if base.testable else []
+    if base.holds:
+        told += [k for k, c in enumerate(runs) if c.holds is False or c.softer > base.softer][:1]
+    finding = " ".join(filter(None, [base.finding, *(f"Seed {seed + APART * k}: {runs[k].finding}" for k in told)]))
+    again = tuple(bool(c.holds) for k, c in enumerate(runs) if k != first) if base.holds is not None else ()
+    return replace(base, finding=finding, again=again, softer=any(c.softer for c in runs))

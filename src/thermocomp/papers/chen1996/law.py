@@ -296,7 +296,7 @@ claims = Claims[Law](__name__)
 
 @claims.facts
 def _whole(found: Law) -> Facts:
-    return {"ours": found.recoveries[OURS]}
+    return {"ours": found.recoveries[OURS], "papers": found.recoveries[DESIGNS[0]], "how": OURS.name}
 
 
 @claims.facts

@@ -80,7 +80,8 @@ def _best(c: Computed) -> Facts:
 @claims.facts
 def _more(c: Computed) -> Facts:
     ours, without = c.grouped.selected_, c.single.selected_
-    return {"ours": len(ours), "without": len(without), "names": named(without)}
+    further = len(without) - len(ours) >= np.subtract(*setup.PAPERS_VARIABLES)
+    return {"ours": len(ours), "without": len(without), "names": named(without), "further": bool(further)}
 
 
 def _takes(c: Computed) -> Facts:
@@ -93,7 +94,8 @@ def _takes(c: Computed) -> Facts:
 @claims.facts
 def _fits(c: Computed) -> Facts:
     ours, judged = c.fits[OPTIMAL], c.fits[JUDGED]
-    return _takes(c) | {"ours": ours, "judged": judged, "ratio": ours.error / judged.error}
+    ratio, (linear, squares) = ours.error / judged.error, setup.PAPERS_ERRORS
+    return _takes(c) | {"ours": ours, "judged": judged, "ratio": ratio, "smaller": ratio <= linear / squares}
 
 
 @claims.facts

@@ -38,6 +38,10 @@ TARGET = "z_um"
 TABLE_1 = ((7,), (9, 10, 11, 12), (13,), (8, 4), (5,), (2,), (1, 6), (3,))
 #: variables of the best model (H-11) relative to these groups
 PAPERS_SHARE = 4 / 8
+#: variables without and with grouping (H-15: Eq. 8 and 6)
+PAPERS_VARIABLES = (7, 4)
+#: standard errors in Table 2 (H-12, H-13): linear model, engineering judgement [um]
+PAPERS_ERRORS = (6.39, 6.72)
 #: eigenvalues in Table 3 of the paper (H-16): with and without grouping, Eq. 6 and 8 despite its header (E-H5)
 TABLE_3 = ((1.1e4, 155.8, 18.6, 3.3), (8861.812, 76.397, 19.835, 2.359, 1.129, 0.114, 0.019))
 #: temperatures of the engineering judgement model, which also uses their squares (H-13)

@@ -33,6 +33,8 @@ NEIGHBOURS = range(1, 11)
 # Criteria of the claims, defined before the first run:
 #: minimum maximal correlation for the model to hold; the paper's own limit for enough temperatures (W-12)
 GOOD_PSI = 0.99
+#: maximal correlation of the reference series in the paper (W-06)
+PAPER_PSI = 0.9994
 #: maximum RMS for an estimate "quite close to the original", as a share of the displacement's span
 CLOSE = 0.05
 
