@@ -245,7 +245,12 @@ def test_fewer_rows_than_variables(intercept: bool, most: int) -> None:
     rng = np.random.default_rng(8)
     rows = 2 + int(intercept)
     assert (
-        len(exhaustive.search_subsets(tri(rng.normal(size=(rows, 3)), np.arange(rows), intercept), range(3)).curve) == 1
+        len(
+            exhaustive.search_subsets(
+                tri(rng.normal(size=(rows, 3)), np.arange(float(rows)), intercept), range(3)
+            ).curve
+        )
+        == 1
     )
 
 
