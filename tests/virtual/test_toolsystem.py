@@ -222,6 +222,7 @@ def test_unusable_steps_are_refused(tool: RestingTool) -> None:
 def test_a_warm_foundation_warms_the_foot(machine: RestingTool) -> None:
     """W-15: with a foundation at room temperature nothing flows."""
     warm = machine.mounted("hydraulic", foundation=5.0)
+    assert machine.mounted("hydraulic").foundation == 0.0
     rises = {}
     for tool in (machine, warm):
         _, truth = run(tool, tool.init(AIR), REST, 60.0, dt=60.0)

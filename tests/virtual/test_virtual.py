@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.recording import Recording
+from thermocomp.virtual import experiments
 from thermocomp.virtual.datasets import EXPERIMENTS, find_experiment, record
 from thermocomp.virtual.experiments import SimulatedTest, simulate
 from thermocomp.virtual.kits import CHEN_PLACES, HWANG_PLACES
@@ -71,6 +72,13 @@ def test_every_experiment_is_well_formed(experiment: str) -> None:
         shaped = [re.match(r"._laser|E[XYZABC][XYZ]_|C0Y|B0Z|A0Z", c.name) is not None for c in test.displacements]
         np.testing.assert_array_equal(test.truth[0][~np.array(shaped)], 0.0)
         assert len(names(test, "spindle_speed")) == (0 if experiment in ("wessel-tool", "wessel-sets") else 1)
+
+
+def test_a_test_does_not_depend_on_its_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """X-01: it is computed block by block; sensors, weather and machine go on where the last one ended."""
+    whole = record("precompensation-cut", seed=3)[0].table
+    monkeypatch.setattr(experiments, "BLOCK", 7)
+    np.testing.assert_allclose(record("precompensation-cut", seed=3)[0].table, whole, rtol=0, atol=1e-9)
 
 
 def test_shapes_are_those_of_the_papers() -> None:
