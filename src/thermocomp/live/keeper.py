@@ -156,7 +156,7 @@ class StateKeeper:
         if self._aged is not None and not lately and _size(in_force, self._aged.get(target)) <= WARM:
             return state
         what = f"{in_force.offset:+.1f} um" + (f" and {in_force.slope:+.1f} um/m" if in_force.slope else "")
-        return self._hold(state, f"{self.cold}, but {what} are in force, so the machine may be warm: {_ASKED}")
+        return self._hold(state, f"{self.cold}, but {target} has {what} in force, so the machine may be warm: {_ASKED}")
 
     def _hold(self, state: CompensatorState, why: str) -> CompensatorState:
         """Return the state with the corrections held, until there is a valid zero; shadow comes before that."""
