@@ -32,6 +32,7 @@ GIVEN = {
     "nc/revision/job.py": {"_expand": 1, "_write": 3},
     "live/journal/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
     "nc/revision/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
+    "papers/exported.py": {"write_loop": 1},  # sources to be compiled, in a temporary folder
     "live/keeper.py": {"put_aside": 1},  # a state that is refused is moved aside, not lost
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one

@@ -10,13 +10,14 @@ from thermocomp.virtual.geometry import cold_profile
 from thermocomp.virtual.instruments import Touch, displacement, mounting, thermometer
 from thermocomp.virtual.kits import CENTRE, CHEN_PLACES, HWANG_PLACES, KITS, Kit, labelled
 from thermocomp.virtual.probes import positioning
-from thermocomp.virtual.toolsystem import RestingTool
+from thermocomp.virtual.toolsystem import SOURCES, RestingTool
 
 
 def test_the_kits_belong_to_their_machines() -> None:
     centre, tool = MachiningCentre(), RestingTool()
     machines = {"centre": (centre.places, centre.observables, centre.model.inputs)}
-    machines["tool"] = (tool.places, tool.observables, tool.model.inputs)
+    machines["tool"] = (tool.places, tool.observables, tuple(SOURCES))
+    assert {i for shares in SOURCES.values() for i in shares} <= {*tool.model.inputs}
     for name, kit in KITS.items():
         places, observables, inputs = machines[name]
         assert {p for p in (*kit.places, *kit.inner) if p not in kit.air} <= set(places)

@@ -109,8 +109,7 @@ def gather(compensator: Compensator) -> Tables:
     limits, lines, thresholds = compensator.limits, compensator.lines, compensator.thresholds
     values: dict[str, Any] = {
         **{name: getattr(limits, name) for name in ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")},
-        "at_rest": zeroing.at_rest,
-        "otherwise": zeroing.otherwise,
+        **{name: getattr(zeroing, name) for name in ("at_rest", "otherwise")},
         "speed_channel": place.get(zeroing.speed, 0),
         "unsigned": [c.name in compensator.unsigned for c in channels],
         **_ranges(ranges, models, place, thresholds),
@@ -137,7 +136,6 @@ def gather(compensator: Compensator) -> Tables:
         "ENDS": 2,
         "COLUMN": max(len(ranges), len(sensors), 2),  # to sort one, gcc would warn of the index 1
         "has_speed": int(bool(zeroing.speed)),
-        "has_unsigned": int(bool(compensator.unsigned)),
         **_sizes(values),
         **_watch_sizes(watch),
         **own_sizes,
@@ -170,6 +168,7 @@ def _sizes(values: dict[str, Any]) -> dict[str, int]:
         "MEMBERS": len(values["set_range"]),
         "FED": len(values["feed_channel"]),
         "has_feed": int(bool(values["feed_channel"])),
+        "has_unsigned": int(any(values["unsigned"])),
         "JUDGED": len(values["judged_model"]),
         "has_zero": int(any(values["model_rezeroed"])),
         "has_absolute": int(not all(values["model_rezeroed"])),
