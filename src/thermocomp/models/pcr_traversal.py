@@ -67,11 +67,6 @@ class TraversedComponents(ShrunkRegressor):
 
     max_points: int = 4
 
-    @property
-    def selected_(self) -> tuple[str, ...]:
-        """Names of the chosen temperatures."""
-        return tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c)
-
     def _paths(self, Z: FloatArray, y: FloatArray) -> FloatArray:
         most = _most_points(self.max_points, Z.shape[1])
         products, moments = Z.T @ Z, Z.T @ y
@@ -96,6 +91,10 @@ class TraversedComponents(ShrunkRegressor):
         _, size = choose(by_size[None], self.rule)
         _, setting = choose(rms[best[size]][None], self.rule)
         return best[size], setting
+
+    def _conclude(self, X: FloatArray, y: FloatArray, weights: FloatArray, intercept: float) -> None:
+        super()._conclude(X, y, weights, intercept)
+        self.selected_ = tuple(name for name, c in zip(self.terms_, self.coef_, strict=True) if c)
 
     def _note(self, which: int, setting: int) -> None:  # noqa: ARG002 - the set is seen from the coefficients
         self.n_components_ = setting + 1

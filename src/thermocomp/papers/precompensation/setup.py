@@ -6,7 +6,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator, CubicSpline, interp1d
+from scipy import interpolate
 
 from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.model import ErrorModel
@@ -28,11 +28,11 @@ POSITIONS = (0, 200, 400, 600)
 BETWEEN = (100, 300, 500)
 NEAREST, LINEAR = "nearest model", "piecewise linear"
 INTERPOLATIONS: Mapping[str, Callable[..., Any]] = {
-    NEAREST: partial(interp1d, kind="nearest", axis=1),
-    LINEAR: partial(interp1d, axis=1),
-    "quadratic spline": partial(interp1d, kind="quadratic", axis=1),
-    "natural cubic spline": partial(CubicSpline, bc_type="natural", axis=1),
-    "cubic polynomial": partial(BarycentricInterpolator, axis=1),
+    NEAREST: partial(interpolate.interp1d, kind="nearest", axis=1),
+    LINEAR: partial(interpolate.interp1d, axis=1),
+    "quadratic spline": partial(interpolate.interp1d, kind="quadratic", axis=1),
+    "natural cubic spline": partial(interpolate.CubicSpline, bc_type="natural", axis=1),
+    "cubic polynomial": partial(interpolate.BarycentricInterpolator, axis=1),
 }
 #: orders of the paper (P-02), and largest orders tried
 PAPERS_ORDERS = (1, 0)
