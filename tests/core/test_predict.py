@@ -36,6 +36,14 @@ PLANE = Polynomial(
 )
 
 
+@pytest.mark.parametrize(("low", "reversed_"), [(0.0, 2.0), (-4000.0, -2.0)])
+def test_a_spindle_in_reverse(low: float, reversed_: float) -> None:
+    """Its amount counts if no speed was negative in the training; else the model has seen what the sign does."""
+    speed = Input("n", "spindle_speed", "1/min", reference=0.0, rezero=False, low=low, high=4000.0)
+    model = replace(PLANE, inputs=(speed,), variables=(Variable.single("n", 0),), coefficients=(1e-3,), intercept=0.0)
+    np.testing.assert_allclose(model.predict({"n": np.array([2000.0, -2000.0])}), [2.0, reversed_])
+
+
 def test_it_is_the_replay() -> None:
     t, time = np.array([20.0, 22.0, 23.0, 23.0]), np.array([0.0, 10.0, 40.0, 100.0])
     state, expected = LAG.init(), []

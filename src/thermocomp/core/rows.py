@@ -72,6 +72,7 @@ def run_table(
 ) -> TableRun:
     """Run a model through a table as `ErrorModel.predict` does."""
     columns = [read_numbers(table, i.name, f"model of {model.target}") for i in model.inputs]
+    columns = [np.abs(c) if i.unsigned else c for i, c in zip(model.inputs, columns, strict=True)]
     clock = read_clock(table, time, f"model of {model.target}", needed=model.remembers)
     n = len(columns[0]) if columns else len(clock) if clock is not None else count_rows(table)
     for name, values in [*zip((i.name for i in model.inputs), columns, strict=True), ("the time", clock)]:

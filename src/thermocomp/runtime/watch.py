@@ -295,7 +295,7 @@ def _stuck(
         then=np.where(fresh, s.predicted, s.then),
     )
     coarser, limits = _coarser(watch, s), watch.thresholds
-    # a fine reading is constant for minutes, a coarse one for so long that the error of its prediction matters
+    # a fine reading is constant for minutes, a coarse one until the error of its prediction matters
     most = np.maximum(watch.limits("moved"), watch.limits("frozen"))
     least = np.where(coarser > 0.0, most + coarser, watch.limits("moved"))
     able = calm | ((s.fault == UNEXPLAINED) & np.isfinite(x))
