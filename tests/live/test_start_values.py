@@ -142,7 +142,7 @@ def test_a_zero_taken_on_a_machine_that_may_be_warm_is_never_used(broker: Mosqui
         ran(again, partial(heat, again, source, 0.0, 1.5))
         held = again.state.orders["z_um"]
         assert held.word == "no zero"
-        assert held.reason.startswith("there is no state.json, but -")
+        assert held.reason.startswith("there is no state.json, but z_um has -")
         assert again.state.corrections == first.state.corrections
     assert statefile.read_zero(state) is None
     last, source = service(MqttSink(topic=TOPIC, port=broker.port), state)
