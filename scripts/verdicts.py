@@ -22,7 +22,7 @@ def entries(study: str) -> list[dict[str, Any]]:
 
 def digest(study: str) -> str:
     """Return a digest of the sentences and criteria of a study's claims."""
-    keys = ("text", "paper", "holds", "softer", "whole", "premise", "each")
+    keys = ("text", "paper", "holds", "softer", "whole", "reading", "premise", "each")
     kept = [[entry.get(key) for key in keys] for entry in entries(study)]
     return hashlib.sha256(json.dumps(kept).encode()).hexdigest()[:16]
 

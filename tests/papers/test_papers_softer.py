@@ -192,16 +192,16 @@ def test_one_temperature_that_is_enough_tests_no_triple(single: float, verdict: 
 
 
 @pytest.mark.parametrize(
-    ("transferred", "own", "verdict"), [(2.0, 1.0, "yes"), (2.01, 1.0, "in part"), (2.01, 0.5, "no")]
+    ("transferred", "own", "verdict"), [(2.0, 1.0, "in part"), (2.0, 0.4, "in part"), (2.01, 1.0, "no")]
 )
 def test_a_model_is_used_with_another_mounting(transferred: float, own: float, verdict: str) -> None:
-    """W-14: a fifth of the error without compensation, twice that of the mounting's own model."""
-    none = 10.05 if verdict == "in part" else 10.0
-    errors = {(a, b): {"none": none, "ace": 9.0 if a == b else 1.0} for a, b in product("abc", repeat=2)}
+    """W-14: a fifth of the error without compensation, whatever that of the mounting's own model."""
+    errors = {(a, b): {"none": 10.0, "ace": 9.0 if a == b else 1.0} for a, b in product("abc", repeat=2)}
     errors["a", "c"]["ace"], errors["c", "c"]["ace"] = transferred, own
     (claim,) = transfer.claims.judged("transferred", transfer.Transfer(errors))
     assert claim.verdict == verdict
-    assert claim.ours.startswith(f"worst a to c: {none:.1f} -> {transferred:.2f} um")
+    assert claim.ours.startswith(f"worst a to c: 10.0 -> {transferred:.2f} um")
+    assert f"up to {transferred / own:.1f} times that with the model of the mounting itself (a to c)" in claim.finding
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,9 @@ order of presentation:
 ``softer``, ``whole``
     Why the criterion is softer than the paper's sentence or number: such a claim holds in part. If the second
     criterion, that of the paper, is also fulfilled, it holds.
+``reading``
+    How a word of the paper that has no number is read, such as ``"'close' as less than 5 %"``: such a claim holds in
+    part at best.
 ``premise``, ``untestable``
     Criterion that the virtual machine has to fulfil for the claim to be testable, and the reason if it does not.
 ``note``, ``otherwise``
@@ -88,6 +91,7 @@ class Claims(Generic[_Found]):
         holds = said.judge(criterion) if criterion and testable else None
         softer = bool(holds) and "softer" in entry and not (entry.get("whole") and said.judge(entry["whole"]))
         reasons = (
+            f"The paper gives no number: we read {entry['reading']}." if "reading" in entry else "",
             entry["softer"] if softer else "",
             "" if testable else entry["untestable"],
             entry.get("note", ""),
@@ -100,6 +104,6 @@ class Claims(Generic[_Found]):
             ours=said.fill(entry["ours"]),
             holds=holds,
             finding=" ".join(filter(None, map(said.fill, reasons))),
-            softer=softer,
+            softer=softer or (bool(holds) and "reading" in entry),
             testable=testable,
         )

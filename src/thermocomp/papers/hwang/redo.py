@@ -84,25 +84,26 @@ def _more(c: Computed) -> Facts:
     return {"ours": len(ours), "without": len(without), "names": named(without), "further": bool(further)}
 
 
-def _takes(c: Computed) -> Facts:
+def _takes(c: Computed, ratio: float) -> Facts:
     judged, ours = (
         " ".join(n for n in c.fits[model].model.sensors if n != setup.REFERENCE) for model in (JUDGED, OPTIMAL)
     )
-    return {"judged_takes": judged, "ours_takes": ours}
+    printed = setup.PAPERS_ERRORS[0] / setup.PAPERS_ERRORS[1]
+    facts = {"ratio": ratio, "printed": printed, "smaller": ratio <= printed}
+    return facts | {"judged_takes": judged, "ours_takes": ours}
 
 
 @claims.facts
 def _fits(c: Computed) -> Facts:
     ours, judged = c.fits[OPTIMAL], c.fits[JUDGED]
-    ratio, (linear, squares) = ours.error / judged.error, setup.PAPERS_ERRORS
-    return _takes(c) | {"ours": ours, "judged": judged, "ratio": ratio, "smaller": ratio <= linear / squares}
+    return _takes(c, ours.error / judged.error) | {"ours": ours, "judged": judged}
 
 
 @claims.facts
 def _predicts(c: Computed) -> Facts:
     z, ours, judged = (c.residuals[name] for name in (NONE, OPTIMAL, JUDGED))
     facts = {"ours_r2": described(ours, z), "judged_r2": described(judged, z)}
-    return _takes(c) | facts | {"ratio": c.errors[OPTIMAL].rms / c.errors[JUDGED].rms}
+    return _takes(c, c.errors[OPTIMAL].rms / c.errors[JUDGED].rms) | facts
 
 
 @claims.facts

@@ -43,8 +43,6 @@ AT_REST, AT_WORK = 5.7 / 1.0, 5.0 / 2.2
 # Criteria of the claims, defined before the first run:
 #: number of intervals of the test in which the largest local gain is sought
 STRETCHES = 10
-#: maximum share of rows of the test outside the training range for this range to count as sufficient
-FEW = 0.05
 #: number of measuring points on each side of the worst one in its episode
 EPISODE = 5
 #: boxcar relative to the number of rows, equal to N = 10 for the 199 rows of the finite-element spindle (E-W8)
@@ -145,9 +143,11 @@ def _locally(r: Resting) -> Facts:
 
 @resting.facts
 def _range(r: Resting) -> Facts:
-    learned, tested = named(r.own.learned), named(r.own.unseen)
-    ranges = [(n, x.min(), x.max(), tested[n].min(), tested[n].max()) for n, x in learned.items()]
-    return {"flagged": r.own.flagged.mean(), "beyond": r.own.beyond.mean(), "ranges": ranges}
+    learned, tested = (named(r.paper.learned) | named(r.own.learned), named(r.paper.unseen) | named(r.own.unseen))
+    ranges = [(n, x.min(), x.max(), tested[n].min(), tested[n].max()) for n, x in sorted(learned.items())]
+    outside = [n for n, low, high, least, most in ranges if least < low or most > high]
+    facts = {"ranges": ranges, "outside": outside, "holds": not outside}
+    return facts | {"flagged": r.own.flagged.mean(), "beyond": r.own.beyond.mean()}
 
 
 @resting.facts

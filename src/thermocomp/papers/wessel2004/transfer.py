@@ -17,11 +17,8 @@ from thermocomp.virtual.datasets import record
 from thermocomp.virtual.kits import KITS
 from thermocomp.virtual.protocol import Physics
 
-# Criteria of the claim, defined before the first run:
-#: largest share of the RMS without compensation that a transferred model may leave
+#: criterion, defined before the first run: share of the RMS without compensation that a transferred model may leave
 SHARE = 0.2
-#: largest ratio of its RMS to that of the model of the mounting itself
-TWICE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
