@@ -339,7 +339,7 @@ def test_slopes_are_learned_from_five_variables(slopes: LearnedPositioning) -> N
 def test_claims_on_slopes_can_fail(slopes: LearnedPositioning) -> None:
     claims = chen1996_slope.claims(slopes)
     assert find(claims, "C-23", "51 sets").ours == "51, 20"
-    assert find(claims, "C-23", "higher-order").holds != any("*" in t for t in slopes.regression.terms_)
+    assert find(claims, "C-23", "higher-order").ours == ", ".join(slopes.regression.terms_)
 
     position = slopes.learned.position
     bent = 5e-3 * position * (position - 550.0) * 0.1 * (np.arange(51) > 0)[:, None]

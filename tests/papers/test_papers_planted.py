@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thermocomp.judging.robustness import Robustness
 from thermocomp.models.selection.grouping import Interval
+from thermocomp.papers.chen1996 import slope
 from thermocomp.papers.common import Errors
 from thermocomp.papers.hwang import redo as hwang
-from thermocomp.papers.hwang.setup import TABLE_1
+from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, TABLE_1
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017.setup import LEAST, PURSUIT, STEPWISE
-from thermocomp.papers.wessel2004 import spindle
+from thermocomp.papers.study import Claim
+from thermocomp.papers.wessel2004 import sets, spindle, tools
 
 
 @pytest.mark.parametrize(("exchanged", "verdict"), [(False, "yes"), (True, "no")])
@@ -64,3 +67,151 @@ def test_an_estimate_close_to_the_series(rms: float, verdict: str) -> None:
     found = SimpleNamespace(rms=lambda _: rms, rms_beside=lambda *_: {"linear": 0.3})
     (claim,) = spindle.claims.judged("close", SimpleNamespace(found=found, span=10.0))  # type: ignore[arg-type]
     assert claim.verdict == verdict
+
+
+class Rows(list[int]):
+    """Rows of a displacement that does not move."""
+
+    deviations = np.zeros((9, 1))
+
+
+@pytest.mark.parametrize(("differs", "verdict"), [(0.09, "in part"), (0.11, "no")])
+def test_neighbours_make_a_slight_difference(differs: float, verdict: str) -> None:
+    """W-05: below 1 % of the span, at every number of them."""
+    found = SimpleNamespace(learned=Rows(range(9)), ace=SimpleNamespace(falling_theta_=0.0))
+    sweep = {1: (0.5, 0.05), 2: (0.5, 0.0), 10: (0.6, differs)}
+    (claim,) = spindle.claims.judged("neighbours", SimpleNamespace(found=found, sweep=sweep, span=10.0))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("ace", "verdict"), [(0.99, "yes"), (1.01, "no")])
+def test_linear_regression_is_not_sufficient(ace: float, verdict: str) -> None:
+    """W-01: where ACE follows the training more closely, the test decides."""
+    facts = {"ace_rms": ace, "mlr": 1.0, "fit": 0.5, "fit_mlr": 0.6, "reasons": False}
+    found = SimpleNamespace(reasons=lambda: facts)
+    (claim,) = spindle.claims.judged("bent", SimpleNamespace(found=found))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("triple", "verdict"), [(0.991, "yes"), (0.989, "no")])
+def test_three_temperatures_are_enough(triple: float, verdict: str) -> None:
+    """W-12: for every displacement."""
+    by_size = {1: np.array([0.9, 0.9]), 2: np.array([0.98, 0.95]), 3: np.array([0.999, triple])}
+    (claim,) = sets.claims.judged("enough", SimpleNamespace(by_size=by_size))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("least", "most", "verdict"), [(20.1, 59.9, "yes"), (20.1, 60.1, "no"), (19.9, 59.9, "no")])
+def test_the_training_is_at_least_as_wide_as_the_test(least: float, most: float, verdict: str) -> None:
+    """W-08: of each temperature, of the paper's set and of our own."""
+
+    def trial(name: str, low: float, high: float) -> SimpleNamespace:
+        channel = SimpleNamespace(name=name)
+        learned, unseen = (
+            SimpleNamespace(inputs=[channel], values=np.array([[a], [b]])) for a, b in ((20.0, 60.0), (low, high))
+        )
+        return SimpleNamespace(learned=learned, unseen=unseen, flagged=np.zeros(2), beyond=np.zeros(2))
+
+    found: Any = SimpleNamespace(paper=trial("t_t1_C", least, most), own=trial("t_t5_C", 30.0, 50.0))
+    (claim,) = tools.resting.judged("range", found)
+    assert claim.verdict == verdict
+    assert claim.finding == ("" if verdict == "yes" else "Wider in the test: T1.")
+    assert claim.ours.startswith(f"T1 20.0-60.0 (test {least:.1f}-{most:.1f}), T5 20.0-60.0 (test 30.0-50.0) degC")
+
+
+def fitted(ratio: float, key: str) -> Claim:
+    """Return a claim on a linear model whose error is this multiple of that with squares."""
+    model = SimpleNamespace(sensors=("T7", "T14"))
+    fits = {m: SimpleNamespace(error=e, r_squared=0.97, model=model) for m, e in ((OPTIMAL, ratio), (JUDGED, 1.0))}
+    wave = np.sin(np.arange(60.0))
+    left = {"no compensation": 9 * wave, OPTIMAL: ratio * wave, JUDGED: wave}
+    c: Any = SimpleNamespace(
+        fits=fits, residuals=left, errors={m: Errors.of(e) for m, e in left.items()}, fit=range(39)
+    )
+    (claim,) = hwang.claims.judged(key, c)
+    return claim
+
+
+@pytest.mark.parametrize("key", ["fits", "predicts"])
+@pytest.mark.parametrize(
+    ("ratio", "verdict"), [(6.39 / 6.73, "yes"), (6.39 / 6.71, "in part"), (1.09, "in part"), (1.11, "no")]
+)
+def test_a_linear_model_beside_one_with_squares(key: str, ratio: float, verdict: str) -> None:
+    """H-12, H-13: 6.39 and 6.72 um."""
+    claim = fitted(ratio, key)
+    assert claim.verdict == verdict
+    assert ("1.1 times is our reading of 'nearly the same level'" in claim.finding) is (verdict == "in part")
+
+
+@pytest.mark.parametrize(("linear", "where", "verdict"), [(0.009, 0, "yes"), (0.011, 7, "no"), (0.011, 0, "no")])
+def test_sensor_errors_scatter_r2(linear: float, where: int, verdict: str) -> None:
+    """H-18: the linear model scatters less at every size of the error and for both distributions."""
+    stds = [0.009] * 8
+    stds[where] = linear
+    keys = [(law, size) for law in LAWS for size in NOISES]
+    shaken = {
+        key: {
+            m: SimpleNamespace(std=s, mean=0.9, r_squared=0.97)
+            for m, s in ((LINEAR, std), (QUADRATIC, 0.01), (PLAIN, 0.01))
+        }
+        for key, std in zip(keys, stds, strict=True)
+    }
+    (claim,) = hwang.claims.judged("noise", SimpleNamespace(shaken=shaken))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+    assert ("; not above for " in claim.finding) is (verdict == "no")
+
+
+@pytest.mark.parametrize(
+    ("noise", "lost", "verdict"), [(2.9, 9.9, "in part"), (3.1, 9.9, "no"), (2.9, 10.1, "no"), (3.5, 11.0, "no")]
+)
+def test_robustness_beside_both_other_methods(noise: float, lost: float, verdict: str) -> None:
+    """E-T5: by smaller factors than with each of both, under noise and without the worst sensor."""
+    disturbed = {STEPWISE: (0.5 * noise, 0.5 * lost), LEAST: (3.0, 12.0), PURSUIT: (4.0, 10.0)}
+    shaken = {
+        m: Robustness(0.4, {"uniform": (n, n)}, {"a": 0.1, "b": worst}, 0.0, 0.0, 1.0)
+        for m, (n, worst) in disturbed.items()
+    }
+    errors = {m: SimpleNamespace(rms=0.5 if m == STEPWISE else 1.0) for m in disturbed}
+    (claim,) = stepwise2017.claims.judged("robust", SimpleNamespace(shaken=shaken, errors=errors))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+    assert claim.ours.startswith(f"noise x {noise:.1f}, lost sensor x {lost:.1f}; least squares x 3.0, x 12.0")
+
+
+def slopes(**given: Any) -> Any:
+    """Return what the claims on Chen's slopes look at."""
+    net = SimpleNamespace(n_epochs=100)
+    found = {
+        "linear": None,
+        "left": lambda _: 2.0,
+        "other_slopes": 60.0,
+        "elsewhere": {slope.MRA: 1.8},
+        "k1": np.ones(9),
+    }
+    trained = [SimpleNamespace(estimator=net)]
+    return SimpleNamespace(**found | {"nets": [SimpleNamespace(trained=trained)], "learned": range(51)} | given)
+
+
+@pytest.mark.parametrize(("terms", "verdict"), [(["T3", "T4", "T7-T9"], "yes"), (["T3", "T4*T3"], "no")])
+def test_slopes_without_products(terms: list[str], verdict: str) -> None:
+    """C-23, C-24: a square is a product, too."""
+    (claim,) = slope.claims.judged("terms", slopes(regression=SimpleNamespace(terms_=terms)))
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("r2", "verdict"), [(0.974, "in part"), (0.972, "no")])
+def test_slopes_are_fitted_closely(r2: float, verdict: str) -> None:
+    """C-24, C-27: the median net counts."""
+    regression = SimpleNamespace(r_squared_=r2, standard_error_=1.0)
+    (claim,) = slope.claims.judged("closely", slopes(regression=regression))
+    (net,) = slope.claims.judged("net_closely", slopes(net_r2=np.array([0.5, r2, 0.999])))
+    assert (claim.verdict, net.verdict) == (verdict, verdict)
+
+
+@pytest.mark.parametrize(("bend", "verdict"), [(0.09, "in part"), (0.11, "no")])
+def test_only_the_slope_varies(monkeypatch: pytest.MonkeyPatch, bend: float, verdict: str) -> None:
+    """C-04, C-05, C-07: what a line leaves of the thermal part, by RMS."""
+    thermal = np.outer(np.arange(1.0, 5.0), np.array([-1.0, 0.0, 1.0, 2.0]))
+    left = {slope.NONE: thermal, slope.MEASURED: bend * thermal}
+    monkeypatch.setattr(slope, "residuals", lambda *_: left)
+    (claim,) = slope.claims.judged("straight", slopes())
+    assert (claim.verdict, claim.ours) == (verdict, f"{bend:.1%}")

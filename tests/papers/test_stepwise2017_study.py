@@ -42,11 +42,12 @@ def test_the_virtual_machine() -> None:
     assert all(np.isfinite(v) for v in study.numbers.values())
     n = study.numbers
     assert n["temperatures"] == 24
-    assert claim(study, "T-07").holds is (1 <= n["chosen"] <= 5)
+    # each number stands where it belongs; the verdicts are those of planted cases, in test_papers_planted and _softer
+    assert claim(study, "T-07").ours.startswith(f"{n['chosen']:.0f}: ")
     least, pursuit, bound = (c for c in study.claims if {"T-08", "T-09"} <= set(c.ids))
-    assert least.holds is (n["rms_online_um"] < n["rms_online_least_squares_um"])
-    assert pursuit.holds is (n["rms_online_um"] < n["rms_online_projection_pursuit_um"])
-    assert bound.holds is (n["max_online_um"] < 5)
+    for c, other in ((least, "least_squares"), (pursuit, "projection_pursuit")):
+        assert c.ours == f"RMS {n['rms_online_um']:.2f} um, {n[f'rms_online_{other}_um']:.2f} um"
+    assert bound.ours.startswith(f"{n['max_online_um']:.1f} um at most")
     assert "predicted by the C code" in bound.ours or "predicted by its Python twin" in bound.ours
     # the method that is recommended stands beside the paper's, under its name (T-08)
     (averaged,) = (c for c in study.claims if "averaged" in c.text)

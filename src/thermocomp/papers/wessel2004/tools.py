@@ -145,8 +145,8 @@ def _locally(r: Resting) -> Facts:
 def _range(r: Resting) -> Facts:
     learned, tested = (named(r.paper.learned) | named(r.own.learned), named(r.paper.unseen) | named(r.own.unseen))
     ranges = [(n, x.min(), x.max(), tested[n].min(), tested[n].max()) for n, x in sorted(learned.items())]
-    outside = [n for n, low, high, least, most in ranges if least < low or most > high]
-    facts = {"ranges": ranges, "outside": outside, "holds": not outside}
+    wider = [n for n, low, high, least, most in ranges if least < low or most > high]
+    facts = {"ranges": ranges, "wider": wider, "holds": not wider}
     return facts | {"flagged": r.own.flagged.mean(), "beyond": r.own.beyond.mean()}
 
 
