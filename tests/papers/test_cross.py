@@ -190,3 +190,26 @@ def test_a_measured_machine(
     assert float(ols[2]) > 4 * float(ols[1])
     (claim,) = study["claims"]
     assert claim["ids"] == ["X-02", "X-03"]
+
+
+@pytest.mark.usefixtures("machine")
+def test_the_table_has_every_method_and_figure_that_the_requirement_names() -> None:
+    """X-03: MRA, ANN, ACE, grouping, precompensation and partial F beside no compensation, in this order of columns."""
+    papers = ("mra", "mlp", "ace", "grouping", "arx", "partial-f")
+    assert set(papers) <= set(cross.FAST)
+    study = cross.run(0, methods=papers, experiments=[CrossExperiment("moving", "z_um")])
+    task = cross.simulate_task(CrossExperiment("moving", "z_um"), seed=0)
+    rows = {r.method: r for r in cross.judge(task, papers)}
+    _, table = study.tables
+    columns = ("method", "fit", "unseen", "max", "p-p", "noise", "lost", "worst input", "inputs", "fit [s]")
+    assert tuple(table.header) == columns
+    assert [r[0] for r in table.rows] == [cross.NONE, *papers]
+    for cells in table.rows:
+        r = rows[cells[0]]
+        errors = (r.fit_rms, r.rms, r.max_abs, r.peak_to_peak, r.noise_rms, r.lost_rms)
+        assert list(cells[1:7]) == [f"{e:.2f}" for e in errors]
+        assert (r.failure, list(cells[7:9])) == ("", [r.lost, str(r.sensors)])
+        assert len({*cells[1:5]}) == 4  # of each method, the figures are different ones
+    assert rows["arx"].sensors == 1
+    assert all(1 <= rows[m].sensors <= 4 for m in papers)
+    assert all(float(cells[-1]) > 0 for cells in table.rows if cells[0] in ("mlp", "ace"))
