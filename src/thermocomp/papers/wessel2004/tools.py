@@ -145,8 +145,11 @@ def _locally(r: Resting) -> Facts:
 def _range(r: Resting) -> Facts:
     learned, tested = (named(r.paper.learned) | named(r.own.learned), named(r.paper.unseen) | named(r.own.unseen))
     ranges = [(n, x.min(), x.max(), tested[n].min(), tested[n].max()) for n, x in sorted(learned.items())]
-    wider = [n for n, low, high, least, most in ranges if least < low or most > high]
-    facts = {"ranges": ranges, "wider": wider, "holds": not wider}
+    wider = [n for n, low, high, least, most in ranges if most - least > high - low]
+    leaves = {n: max(low - least, most - high) for n, low, high, least, most in ranges}
+    leaving = [n for n, by in leaves.items() if by > 0]
+    facts = {"ranges": ranges, "wider": wider, "holds": not wider, "covered": not leaving}
+    facts |= {"leaving": leaving, "excess": max(leaves.values())}
     return facts | {"flagged": r.own.flagged.mean(), "beyond": r.own.beyond.mean()}
 
 
