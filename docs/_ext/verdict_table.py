@@ -13,6 +13,10 @@ Claims by study, id and a part of the paper's number (without: all claims of thi
     .. verdict-text:: hwang H-16
 
 Claims as plain text.
+
+    .. measured-table::
+
+RMS errors of linear regression and ACE on a measured machine, from ``measured.json``.
 """
 
 import json
@@ -31,6 +35,7 @@ from thermocomp.papers.study import Claim, Study
 #: headings of verdicts
 HEADINGS = {"yes": "hold in each run", "some": "in some runs", "no": "in none"}
 FILE = Path(__file__).parents[1] / "verdicts.json"
+MEASURED = FILE.with_name("measured.json")
 
 
 def read() -> dict[str, Study]:
@@ -67,15 +72,16 @@ class VerdictTable(SphinxDirective):
     """See the module."""
 
     widths = "auto"
+    file = FILE
 
     def run(self) -> list[nodes.Node]:
         """Return a table."""
-        self.env.note_dependency(str(FILE))
+        self.env.note_dependency(str(self.file))
         lines = [".. list-table::", "   :header-rows: 1", f"   :widths: {self.widths}", ""]
         for row in self.rows(read()):
             lines += [f"   {' ' if k else '*'} - {cell}" for k, cell in enumerate(row)]
         place = nodes.container()
-        self.state.nested_parse(StringList(lines, source=str(FILE)), self.content_offset, place)
+        self.state.nested_parse(StringList(lines, source=str(self.file)), self.content_offset, place)
         return place.children
 
     def rows(self, studies: dict[str, Study]) -> Iterator[tuple[str, ...]]:
@@ -102,6 +108,19 @@ class HeadlineTable(VerdictTable):
                 yield f"``{line.split()[0]}``", *(re.sub(r"([\\*|_`])", r"\\\1", cell) for cell in cells)
 
 
+class MeasuredTable(VerdictTable):
+    """See the module."""
+
+    file = MEASURED
+
+    def rows(self, _: dict[str, Study]) -> Iterator[tuple[str, ...]]:
+        """Yield the cells of each row, first the header."""
+        rms: dict[str, dict[str, float]] = json.loads(MEASURED.read_text(encoding="utf-8"))["rms_um"]
+        yield "method", *(f"``{target}``" for target in rms["none"])
+        for method, errors in rms.items():
+            yield f"``{method}``" if method != "none" else method, *(f"{e:.1f}" for e in errors.values())
+
+
 class VerdictText(SphinxDirective):
     """See the module."""
 
@@ -122,6 +141,7 @@ def setup(app: Any) -> dict[str, bool]:
         ("verdict-table", VerdictTable),
         ("headline-table", HeadlineTable),
         ("verdict-text", VerdictText),
+        ("measured-table", MeasuredTable),
     ):
         app.add_directive(name, directive)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -113,6 +113,40 @@ def test_headlines_are_claims_with_a_verdict() -> None:
         page.headlines("made W-08 5.8", MADE)
 
 
+def test_errors_on_a_measured_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pooled over the cycles, without the limits of a compensator; the table is made of what is kept (W-08)."""
+
+    def result(model: str, target: str, rms: float, block: str = "all unseen cycles") -> dict[str, object]:
+        return {
+            "model": model,
+            "target": target,
+            "block": block,
+            "none_rms_um": 9.0,
+            "rms_um": 0.0,
+            "alone_rms_um": rms,
+        }
+
+    results = [result("ols", "ch1_um", 5.0, "cycle 1"), result("ols", "ch1_um", 7.46), result("ace", "ch1_um", 4.9)]
+    made = {"thermocomp": "1", "arguments": ["compare"], "judging": "each cycle", "results": results}
+    asked: list[tuple[list[str], Path]] = []
+
+    def run(line: list[str], *, cwd: Path, **_: object) -> SimpleNamespace:
+        asked.append((line, cwd))
+        return SimpleNamespace(stdout=json.dumps(made))
+
+    monkeypatch.setattr(script.subprocess, "run", run)
+    monkeypatch.setattr(script, "METHODS", ("ols", "ace"))
+    monkeypatch.setenv("THERMOCOMP_DATA", str(tmp_path))
+    for module in (script, page):
+        monkeypatch.setattr(module, "MEASURED", tmp_path / "measured.json")
+    script.main(["measured"])
+    ((line, folder),) = asked
+    assert line[2:8] == ["thermocomp.cli.app", "compare", "recording.csv", "--models", "ols", "ace"]
+    assert folder == tmp_path / "fl_thermal"
+    rows = [*page.MeasuredTable.rows(None, {})]
+    assert rows == [("method", "``ch1_um``"), ("none", "9.0"), ("``ols``", "7.5"), ("``ace``", "4.9")]
+
+
 def test_the_page_shows_headlines_of_all_papers() -> None:
     content = (ROOT / "docs" / "studies.rst").read_text(encoding="utf-8")
     (lines,) = re.findall(r"headline-table::\n\n((?:   .+\n)+)", content)
