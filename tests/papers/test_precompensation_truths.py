@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -54,7 +55,7 @@ def recordings(
             *(Channel(c, "displacement", "um") for c in columns),
             Channel("spindle_rpm", "spindle_speed", "1/min"),
         )
-        time = 600.0 * np.arange(len(speed))
+        time: FloatArray = 600.0 * np.arange(len(speed), dtype=np.float64)
         table = pd.DataFrame({**columns, "spindle_rpm": speed})
         tests.append(Recording(f"{experiment}-{hours}", time, table, channels, find_cycles(time, speed)))
     return tests
@@ -64,7 +65,7 @@ def recordings(
 def computed(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Computed]:
     """Return the results for a machine; the nets are replaced by least squares, which learns such laws exactly."""
 
-    def compute(**machine: object) -> Computed:
+    def compute(**machine: Any) -> Computed:
         monkeypatch.setattr(setup, "record", partial(recordings, **machine))
         monkeypatch.setattr(setup, "NetARX", partial(NetARX, hidden=1, epochs=1))
         monkeypatch.setattr(setup, "CUTS", 1)

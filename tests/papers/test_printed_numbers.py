@@ -216,6 +216,7 @@ CLAIMED: dict[str, str] = {
     "precompensation.redo.scheduled": "10",  # P-06
     "stepwise2017.redo.given": "24",  # T-01, abstract
     "stepwise2017.redo.few": "5 3 9 11 18 23",  # T-07, section 3.2, below Eq. 8
+    "stepwise2017.redo.model": "8",  # Eq. 8
     "stepwise2017.redo.beats": "6",  # Fig. 6
 }
 

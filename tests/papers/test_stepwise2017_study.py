@@ -1,5 +1,6 @@
 """The study of stepwise2017: its procedure, and that its claims can fail."""
 
+import re
 import shutil
 from dataclasses import replace
 from types import SimpleNamespace
@@ -86,6 +87,18 @@ def test_a_drift_of_two_temperatures(monkeypatch: pytest.MonkeyPatch) -> None:
     needed = [float(row[2]) for row in study.tables[2].rows]
     assert needed == sorted(needed)
     assert needed[-1] == pytest.approx(100 / (100 + float(study.tables[2].rows[-1][0]) - 2), abs=0.005)
+
+
+def test_the_model_is_printed_with_its_coefficients() -> None:
+    """T-07: Eq. 8 of a drift of which the two temperatures and their coefficients are known."""
+    warm = common.stacked(_of("stepwise2017", 0, few=True), ["x1_um"], HEAT)
+    models = common.fit_and_freeze(PartialF(), warm, ["x1_um"])
+    found = SimpleNamespace(models={stepwise2017_setup.STEPWISE: models["x1_um"]})
+    (claim,) = stepwise2017.claims.judged("model", found)  # type: ignore[arg-type]
+    assert claim.ours.startswith("x = ")
+    found_terms = re.findall(r"([+-]) ([\d.]+) (t_\w+_C)", claim.ours)
+    terms = {name: float(sign + value) for sign, value, name in found_terms}
+    assert terms == pytest.approx({"t_front_seat_C": 3.0, "t_table_C": -8.0}, abs=0.1)
 
 
 def test_what_a_first_temperature_has_to_explain() -> None:

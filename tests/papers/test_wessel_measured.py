@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from thermocomp.cli.app import run
 from thermocomp.judging.compare import compare
 from thermocomp.judging.splits import leave_one_cycle_out
 from thermocomp.papers.common import stacked
@@ -45,11 +46,16 @@ def test_the_methods_on_a_measured_machine(shared_data: Path) -> None:
 
 
 @pytest.mark.long
-def test_the_page_tells_the_errors_of_a_measured_machine(shared_data: Path) -> None:
+def test_the_page_tells_the_errors_of_a_measured_machine(shared_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = printed()
     assert [*told] == ["none", *METHODS]
-    for method, rms in errors(shared_data, 1, METHODS, "12345").items():
-        assert told[method] == pytest.approx(rms, rel=1e-3), method
+    recording = str(shared_data / "fl_thermal" / "recording.csv")
+    assert run(["compare", recording, "--models", *METHODS, "--no-robustness", "--json"]) == 0
+    results = json.loads(capsys.readouterr().out)["results"]
+    for method in METHODS:
+        pooled = [r for r in results if r["model"] == method and r["block"] == "all unseen cycles"]
+        assert told[method] == pytest.approx([r["alone_rms_um"] for r in pooled], rel=1e-3), method
+        assert told["none"] == pytest.approx([r["none_rms_um"] for r in pooled], rel=1e-3)
 
 
 def test_the_page_tells_what_its_table_shows() -> None:

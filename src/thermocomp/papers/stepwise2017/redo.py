@@ -53,6 +53,11 @@ def _few(c: Computed) -> Facts:
 
 
 @claims.facts
+def _model(c: Computed) -> Facts:
+    return {"formula": c.models[STEPWISE].formula()}
+
+
+@claims.facts
 def _deleted(c: Computed) -> Facts:
     return {"places": [_place(s.term) for s in c.selection.log_ if s.action == "remove"] or "none"}
 
