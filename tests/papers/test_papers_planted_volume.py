@@ -12,6 +12,7 @@ from thermocomp.papers.precompensation.cutting import RIGHT
 from thermocomp.papers.precompensation.program import NEEDED, SAFE
 from thermocomp.papers.precompensation.setup import LEAST, NET
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
+from thermocomp.virtual.geometry import find_cold_component
 
 
 @pytest.mark.parametrize(("closure", "verdict"), [(0.09, "yes"), (0.11, "no")])
@@ -37,7 +38,7 @@ def test_a_profile_of_two_coordinates_is_nearer(flat: float, full: float, verdic
     """C-06."""
 
     def off(by: float) -> SimpleNamespace:
-        profile = SimpleNamespace(at=lambda points: anywhere.find_cold_component("EYX", points) + by)
+        profile = SimpleNamespace(at=lambda points: find_cold_component("EYX", points) + by)
         return SimpleNamespace(model=SimpleNamespace(profile=profile))
 
     found: Any = SimpleNamespace(learned=SimpleNamespace(flat=off(flat), fits={"EYX": off(-full)}))
