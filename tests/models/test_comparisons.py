@@ -165,6 +165,29 @@ def test_ridge_is_the_ridge_of_dynamic() -> None:
     assert estimator.intercept_ == pytest.approx(intercepts[0], rel=1e-9)
 
 
+@pytest.mark.parametrize("intercept", [False, True])
+@pytest.mark.parametrize("singular", [False, True])
+@pytest.mark.parametrize("columns", [1, 2, 3, 20])
+def test_many_strengths_at_once_are_each_of_them_alone(columns: int, singular: bool, intercept: bool) -> None:
+    rng = np.random.default_rng(columns)
+    table = rng.normal(size=(60, columns + 2))
+    if singular:
+        table[:, 0] = table[:, columns - 1]
+    table[:, -2] = 1.0
+    strengths = (0.0, 1e-6, 0.03, 2.0)[singular:]
+    weights, intercepts = moments.solve(table.T @ table, strengths, intercept)
+    for k, strength in enumerate(strengths):
+        alone, constant = moments.solve(table.T @ table, (strength,), intercept)
+        assert weights[:, k] == pytest.approx(alone[:, 0], rel=1e-8, abs=1e-9)
+        assert intercepts[k] == pytest.approx(constant[0], rel=1e-8, abs=1e-9)
+
+
+def test_a_matrix_that_rounding_makes_indefinite_has_a_ridge_all_the_same() -> None:
+    gram = np.diag([1.0, 1.0, 1.0, -1e-9])
+    found = moments._solve_shifted(gram, np.ones(4), np.array([1e-12, 1e-10]))
+    assert found == pytest.approx(np.stack([np.append(np.ones(3), 1 / s) for s in (1e-12, 1e-10)], axis=1))
+
+
 @pytest.mark.parametrize("estimator", [PrincipalComponents, PartialLeastSquares])
 def test_all_components_are_least_squares(estimator: type[PrincipalComponents] | type[PartialLeastSquares]) -> None:
     T, y, _ = cycles(3)
