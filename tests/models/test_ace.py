@@ -149,6 +149,33 @@ def test_converged_kernel_is_the_limit_of_its_twin(seed: int, n: int, p: int, ha
     assert errors[-1] <= again.errors[-1] + 1e-6 if again.errors else psi == 0
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_sweeps_are_accelerated_as_by_the_twin(seed: int) -> None:
+    """W-03: the momentum grows with the sweeps since a change was larger than the one before it."""
+    from thermocomp.models.kernels import ace as kernel
+    from thermocomp.models.kernels import ranks
+
+    rng = np.random.default_rng(seed)
+    T = np.cumsum(rng.normal(size=(50, 3)), axis=0)
+    S = T[:, 0] ** 2 / 5 + T[:, 1] + rng.normal(size=50)
+    ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    *_, errors = kernel.solve(*ranked, 4, 0.0, 25, True)
+    twin = twin_ace.fit(T, S, 4, -np.inf, 25, twice=True, momentum=0.95)
+    assert len(errors) == 25
+    np.testing.assert_allclose(errors, twin.errors, rtol=0, atol=1e-9)
+
+
+def test_correlation_of_the_kernel() -> None:
+    """W-02: Pearson's of what has no mean, whatever its size; none with what does not vary."""
+    from thermocomp.models.kernels.ace import _correlation
+
+    x, y = np.random.default_rng(0).normal(size=(2, 30))
+    x, y = x - x.mean(), y - y.mean()
+    for scale in (1.0, -1e-4):
+        assert _correlation(scale * x, y) == pytest.approx(abs(np.corrcoef(x, y)[0, 1]), rel=1e-12)
+    assert _correlation(np.zeros(30), y) == 0.0
+
+
 def test_stop_rules() -> None:
     T, y = bent()
     paper = ACE(max_sweeps=2000).fit(T, y)

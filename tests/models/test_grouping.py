@@ -54,6 +54,7 @@ def test_groups_follow_the_paper(C: FloatArray, threshold: float, absolute: bool
     found = grouping.group(C, threshold, absolute=absolute)
     assert [list(g) for g in found] == twin.grouped(C, threshold, absolute)
     assert sorted(k for g in found for k in g) == list(range(len(C)))
+    assert absolute or found == grouping.group(C, threshold)
     for seed, *others in found:
         assert all((abs(C[seed, k]) if absolute else C[seed, k]) > threshold for k in others)
 
@@ -129,6 +130,10 @@ def test_correlation_is_pearsons() -> None:
     copied = correlation(X[:, [0, 0, 1, 2, 0]])
     assert copied[0, 1] == copied[0, 4] == 1.0
     assert np.array_equal(copied[0, 2:4], copied[4, 2:4])
+    # to twelve decimals
+    C, exact = correlation(X), np.corrcoef(X.T)
+    np.testing.assert_array_equal(C, np.round(C, 12))
+    assert np.abs(C - exact).max() < 6e-13
     X[:, 3] = 20.1
     with pytest.raises(FitError, match="column 3 is constant"):
         correlation(X)
@@ -305,6 +310,8 @@ def test_spectrum() -> None:
     copied = spectrum(X[:, [0, 1, 0]])
     assert (copied.smallest, copied.sum_inverse, copied.condition_number) == (0.0, np.inf, np.inf)
     assert spectrum(X[:2]).eigenvalues[2:] == (0.0, 0.0)
+    # nothing is what is small beside the greatest, not beside the next
+    assert spectrum(np.diag([1.0, 1e-10, 1e-15])).eigenvalues == pytest.approx((1.0, 1e-20, 0.0), rel=1e-9, abs=0.0)
     none = spectrum(X[:, :0])
     assert none.eigenvalues == ()
     assert none.sum_inverse == 0
