@@ -290,6 +290,12 @@ def test_theta_that_is_not_monotone_is_told_and_cured() -> None:
     # E-W5
     T, y = bent(6, 300, noise=2.0)
     assert 0 < ACE().fit(T, y).falling_theta_ < 1
+    tied = ACE().fit(T, np.round(4 * y) / 4)
+    distinct, first = np.unique(tied.theta_.x, return_index=True)
+    assert len(distinct) < len(y)
+    assert tied.falling_theta_ == np.mean(np.diff(tied.theta_.y[first]) < 0) > 0
+    still = ACE().fit(T, np.full(len(y), 7.0))  # nothing rises or falls, and nothing is needed to predict it
+    assert (still.falling_theta_, still.psi_, still.freeze(target="z").inputs) == (0.0, 0.0, ())
     m = MonotoneACE().fit(T, y)
     assert m.falling_theta_ == 0
     assert (np.diff(m.theta_.y) >= 0).all()
