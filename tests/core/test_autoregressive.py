@@ -225,7 +225,7 @@ def test_state_in_state_out() -> None:
 def test_the_first_time_step_has_no_meaning() -> None:
     model = linear()
     assert model.step(model.init(), np.array([3000.0, 20.0]), 1e4)[1] == 0.0
-    courses = []
+    courses: list[list[float]] = []
     for first in (0.0, 1.0, 1e4):
         state, _ = model.step(model.init(), np.array([3000.0, 20.0]), first)
         courses.append([])

@@ -50,11 +50,11 @@ def test_a_small_change_is_taken_when_it_is_due() -> None:
 def test_what_moved_by_the_tolerance_stays() -> None:
     """P-06: each axis for itself, once one of them has moved by more."""
     drift, demand = SimpleNamespace(deviation=lambda _: (2.0, 0.0, 3.0)), Demand(1.0)
-    assert demand.at(0.0, drift, HERE) == (-2.0, 0.0, -3.0)  # type: ignore[arg-type]
+    assert demand.at(0.0, drift, HERE) == (-2.0, 0.0, -3.0)
     drift.deviation = lambda _: (3.0, -1.0, 4.0)
-    assert demand.at(1.0, drift, HERE) == (-2.0, 0.0, -3.0)  # type: ignore[arg-type]
+    assert demand.at(1.0, drift, HERE) == (-2.0, 0.0, -3.0)
     drift.deviation = lambda _: (3.0, -1.25, 4.0)
-    assert demand.at(2.0, drift, HERE) == (-2.0, 1.25, -3.0)  # type: ignore[arg-type]
+    assert demand.at(2.0, drift, HERE) == (-2.0, 1.25, -3.0)
 
 
 def test_a_drift_that_changes_its_sign_is_followed() -> None:

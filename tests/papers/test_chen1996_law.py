@@ -20,6 +20,11 @@ ASKED: list[tuple[str, int]] = []
 TEMPERATURES_OF = law.temperatures
 
 
+def asked(experiment: str, day: int) -> list[FloatArray]:
+    ASKED.append((experiment, day))
+    return TEMPERATURES_OF(experiment, day)
+
+
 @pytest.fixture(scope="module")
 def days() -> list[list[FloatArray]]:
     return [law.temperatures("chen1996-law", k) for k in DAYS]
@@ -31,7 +36,7 @@ def sought() -> Law:
         patch.setattr(law, "SigmoidNet", partial(SigmoidNet, n_epochs=500))
         for name, value in {"DAYS": 2, "DRAWS": 20, "FEWER": 10}.items():
             patch.setattr(law, name, value)
-        patch.setattr(law, "temperatures", lambda e, day: ASKED.append((e, day)) or TEMPERATURES_OF(e, day))
+        patch.setattr(law, "temperatures", asked)
         return law.seek(5)
 
 

@@ -143,12 +143,12 @@ def test_gain_in_stretches() -> None:
     mlr, ace = np.full(100, 12.0), np.full(100, 6.0)
     ace[20:30] = 1.0
     trial: Any = Trial(mlr=mlr, ace=ace, unseen=range(100))
-    facts = tools._locally(SimpleNamespace(own=trial))  # type: ignore[arg-type]
+    facts = tools._locally(SimpleNamespace(own=trial))
     assert facts["gains"] == pytest.approx([2, 2, 12, 2, 2, 2, 2, 2, 2, 2])
     assert (facts["first"], facts["last"], facts["gain"]) == (21, 30, pytest.approx(12.0))
     assert facts["total"] == pytest.approx(12 / np.sqrt((90 * 36 + 10) / 100))
     ace[20:30] = 0.0  # a thousandth of a nanometre is nothing
-    assert tools._locally(SimpleNamespace(own=trial))["gain"] == pytest.approx(12e9)  # type: ignore[arg-type]
+    assert tools._locally(SimpleNamespace(own=trial))["gain"] == pytest.approx(12e9)
 
 
 def test_both_sets_of_the_resting_tool() -> None:
@@ -228,6 +228,6 @@ def test_a_bound_that_proves_little(largest: float, drift_of: float, tiny: bool)
 def test_a_depth_that_stays_is_not_worse() -> None:
     """P-07: means over positions, by magnitude."""
     cuts = [CuttingTest(np.array([3.0, -1.0]), np.array(after)) for after in ([2.0, 2.0], [-2.5, 2.5], [1.0, 0.0])]
-    facts = precompensation._depth(SimpleNamespace(depths=(4.0, 1.0), cuts=cuts))  # type: ignore[arg-type]
+    facts = precompensation._depth(SimpleNamespace(depths=(4.0, 1.0), cuts=cuts))
     assert cuts[0].means == (2.0, 2.0)
     assert facts == {"without": 4.0, "with": 1.0, "left": 0.25, "worse": 1}
