@@ -204,6 +204,11 @@ def test_rounding_is_told_from_a_small_remainder(seed: int) -> None:
     assert grouping.representatives(tri(X, y + 1e-5 * X[:, 3]), groups) == (0, 3, 4)
     found = exhaustive.search_subsets(tri(X[:, :4], y), range(4))
     assert (found.best.columns, found.best.mse) == ((0,), 0.0)
+    # a column of zeros explains nothing, with or without a constant
+    X[:, 4] = 0.0
+    for intercept in (True, False):
+        whole = exhaustive.search_subsets(tri(X, X[:, 2] + 0.1 * X[:, 3] ** 2, intercept), range(5))
+        assert 4 not in whole.best.columns
 
 
 def test_sensors_that_almost_repeat_each_other() -> None:
@@ -312,6 +317,8 @@ def test_spectrum() -> None:
     assert spectrum(X[:2]).eigenvalues[2:] == (0.0, 0.0)
     # nothing is what is small beside the greatest, not beside the next
     assert spectrum(np.diag([1.0, 1e-10, 1e-15])).eigenvalues == pytest.approx((1.0, 1e-20, 0.0), rel=1e-9, abs=0.0)
+    two = spectrum(np.diag([1.0, 0.5]))
+    assert (two.smallest, two.sum_inverse, two.condition_number) == pytest.approx((0.25, 5.0, 4.0))
     none = spectrum(X[:, :0])
     assert none.eigenvalues == ()
     assert none.sum_inverse == 0
