@@ -346,6 +346,6 @@ def test_constant_and_copied_inputs_and_a_dead_probe() -> None:
 def test_orders_of_a_table_that_is_too_short() -> None:
     rng = np.random.default_rng(0)
     tri = triangle(join_columns(rng.normal(size=(3, 4)), rng.normal(size=3)), intercept=False)
-    found = orders.compute_orders(tri, 1, range(3), range(2))
+    found = orders.compute_orders(tri, 1, range(3), range(2), 1.0)
     assert [o.admissible for o in found if o.n_parameters >= 3] == [False] * 3
     assert orders.best([o for o in found if not o.admissible], "fpe") is None

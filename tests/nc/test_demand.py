@@ -2,12 +2,14 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from nc_law import Growing, Steady
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand, oppose_deviation
 from thermocomp.nc.rewrite.text import Vector
 
@@ -87,3 +89,16 @@ class _Set(Steady):
 def test_what_is_no_thermal_drift_is_refused(z: float, said: str, every: float | None) -> None:
     with pytest.raises(InputError, match=said):
         Demand(1.0, every).at(0.0, _Set(z), HERE)
+
+
+@pytest.mark.parametrize("optional", [False, True])
+@pytest.mark.parametrize("moved", [False, True])
+def test_an_axis_placed_by_an_optional_line_is_in_doubt(optional: bool, moved: bool) -> None:
+    """P-06: it is fixed no more; where it is, is known if the line is run for certain."""
+    doubts: list[tuple[int, float]] = []
+    state: Any = SimpleNamespace(fixed=[True] * 3, doubtful=[True] * 3, doubt=lambda *d: doubts.append(d))
+    block: Any = SimpleNamespace(line=SimpleNamespace(optional=optional))
+    Coordinates._placed(state, block, 1, 4.5, moved=moved)
+    assert state.fixed == [True, False, True]
+    assert state.doubtful == [True, optional, True]
+    assert doubts == [(1, 4.5)] * (optional and moved)

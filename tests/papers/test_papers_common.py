@@ -61,13 +61,10 @@ def test_noise_is_on_the_temperatures_alone(law: str, largest: float, std: float
 def test_the_noise_of_a_draw(tests: Samples) -> None:
     """C-33: numpy's own numbers, one for each reading of a temperature."""
     warm = np.array([c.quantity == "temperature" for c in tests.inputs])
-    for law, draw in (
-        ("uniform", lambda r: r.uniform(-0.4, 0.4, tests.values.shape)),
-        ("normal", lambda r: r.normal(0, 0.4, tests.values.shape)),
-    ):
-        noisy = common.with_noise(tests, 0.4, "uniform" if law == "uniform" else "normal", 3)
-        expected = tests.values + draw(np.random.default_rng(3)) * warm
-        np.testing.assert_array_equal(noisy.values, expected)
+    shape = tests.values.shape
+    uniform, normal = (common.with_noise(tests, 0.4, law, 3).values - tests.values for law in ("uniform", "normal"))
+    np.testing.assert_allclose(uniform, np.random.default_rng(3).uniform(-0.4, 0.4, shape) * warm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(normal, np.random.default_rng(3).normal(0.0, 0.4, shape) * warm, rtol=0, atol=1e-9)
 
 
 def test_a_sensor_that_is_cut_off_stays_at_its_zero(tests: Samples) -> None:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations_with_replacement
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -325,9 +324,11 @@ def test_the_wider_series_is_the_one_with_peaks(
     monkeypatch.setattr(wessel2004_spindle, "record", lambda *_, **__: both)
     orders: list[tuple[str, ...]] = []
 
-    def asked(recordings: Sequence[Recording], *which: Any, **beside: bool) -> Any:
-        orders.append((*(r.name for r in recordings), str(beside.get("beside", True))))
-        return trial(recordings, *which, **beside)
+    def asked(
+        recordings: Sequence[Recording], target: int, temperatures: Sequence[int], *, beside: bool = True
+    ) -> MillingTrial:
+        orders.append((*(r.name for r in recordings), str(beside)))
+        return trial(recordings, target, temperatures, beside=beside)
 
     monkeypatch.setattr(wessel2004_spindle, "trial", asked)
     found = wessel2004_spindle.spindle(0, lambda *_: None)
