@@ -79,6 +79,24 @@ def test_kernel_is_the_paper_literally(seed: int, n: int, p: int, half: int, tie
     assert psi == pytest.approx(expected.psi, abs=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_first_variable_that_tells_something_begins(seed: int) -> None:
+    """W-03: one that does not change is passed over; where nothing changes there is nothing to transform."""
+    rng = np.random.default_rng(seed)
+    T = np.cumsum(rng.normal(size=(40, 3)), axis=0)
+    S = T[:, 1] ** 2 + T[:, 2]
+    T[:, 0] = 7.0
+    expected = twin_ace.fit(T, S, 5, 1e-9, 20)
+    theta, phi, psi, errors = kernel_fit(T, S, 5, 1e-9, 20)
+    np.testing.assert_allclose(errors, expected.errors, atol=1e-12)
+    np.testing.assert_allclose(theta, expected.theta, atol=1e-12)
+    np.testing.assert_allclose(phi, expected.phi, atol=1e-12)
+    assert psi == pytest.approx(expected.psi, abs=1e-12)
+    for nothing in (T, np.full((40, 3), 7.0)):
+        theta, phi, psi, errors = kernel_fit(nothing, S if nothing is not T else np.full(40, 3.0), 5, 1e-9, 20)
+        assert (psi, len(errors), theta.any(), phi.any()) == (0.0, 0, False, False)
+
+
 @pytest.mark.parametrize("n", [2, 5, 63, 64, 300, 9000])
 @pytest.mark.parametrize("kind", ["plain", "quantised", "outlier", "constant", "huge"])
 def test_ranks_are_those_of_a_stable_sort(n: int, kind: str) -> None:

@@ -17,17 +17,16 @@ MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 @compiled
 def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> bool:
     """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; return False if there is none."""
-    order, groups = how[2], how[4]
+    order = how[2]
     n = len(start)
     for j in range(len(phi)):
-        if groups[j] > 1:
-            running_sums(start, phi[j], order[j], sums)
-            smooth(sums, how, j, phi[j])
-            if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
-                for i in range(n):
-                    total[order[j, i]] = phi[j, i]
-                return True
-            phi[j] = 0.0
+        running_sums(start, phi[j], order[j], sums)
+        smooth(sums, how, j, phi[j])
+        if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
+            for i in range(n):
+                total[order[j, i]] = phi[j, i]
+            return True
+        phi[j] = 0.0
     return False
 
 
