@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from thermocomp.core import expression
 from thermocomp.core.autoregressive import Autoregressive, AutoregressiveNet, Ticking, find_largest_root
 from thermocomp.core.exceptions import InputError, ReadingError
 from thermocomp.core.inputs import Input
@@ -122,6 +123,11 @@ def test_orders_are_those_of_the_equation() -> None:
     """P-01: two past drifts, and three values of the speed, which are two past ones and the present."""
     assert linear(A, B[:1]).orders == (2, 2)
     assert linear((0.5,), B).orders == (1, 2)
+    speed, oil = expression.Input(0, "n"), expression.Input(1, "oil")
+    past = [expression.Past(1), expression.Past(2)]
+    driven = [expression.Mean(x, i) for i in (0, 1, 2) for x in (speed, oil)]
+    assert linear()._regressors([speed, oil]) == past + driven
+    assert linear()._weights.tolist() == [*A, B[0][0], B[1][0], B[0][1], B[1][1], B[0][2], B[1][2]]
 
 
 def test_jitter_does_not_matter() -> None:
@@ -219,6 +225,15 @@ def test_state_in_state_out() -> None:
 def test_the_first_time_step_has_no_meaning() -> None:
     model = linear()
     assert model.step(model.init(), np.array([3000.0, 20.0]), 1e4)[1] == 0.0
+    courses: list[list[float]] = []
+    for first in (0.0, 1.0, 1e4):
+        state, _ = model.step(model.init(), np.array([3000.0, 20.0]), first)
+        courses.append([])
+        for reading in ([3000.0, 20.5], [1000.0, 21.0]):
+            state, deviation = model.step(state, np.array(reading), H - 0.5)
+            courses[-1].append(float(deviation))
+    assert courses[0] == courses[1] == courses[2]
+    assert courses[0][-1] != 0.0
 
 
 def test_carry_over_from_the_last_job() -> None:

@@ -26,3 +26,12 @@ def test_axis_components_depend_on_their_axis() -> None:
     assert BY_CODE["EAY"].depends_on == "Y"
     assert BY_CODE["EYY"].description == "positioning of Y"
     assert BY_CODE["ECZ"].description == "roll of Z"
+
+
+def test_codes_and_axes_written_out() -> None:
+    """C-01, C-02: three translations and three rotations per axis, three squarenesses, drifts, tilts, shifts."""
+    axes = [f"E{motion}{axis}" for axis in "XYZ" for motion in "XYZABC"]
+    scalars = ["C0Y", "B0Z", "A0Z", "X0C", "Y0C", "Z0C", "A0C", "B0C", "XOX", "YOX", "ZOX", "XOY", "YOY", "ZOY"]
+    assert [c.code for c in COMPONENTS] == [*axes, *scalars]
+    pairs = [("Y", "X"), ("Z", "X"), ("Z", "Y")]
+    assert [c.axes for c in COMPONENTS[18:]] == [*pairs, *[()] * 5, *[("X",)] * 3, *[("Y",)] * 3]

@@ -107,6 +107,9 @@ def test_support_policies(policy: str, expected: list[float]) -> None:
     # two independent runs together, of which one leaves the range
     state, _ = model.step(model.init([20.0]), np.array([[25.0], [25.0]]), 0.0)
     assert model.step(state, np.array([[31.0], [24.0]]), 1.0)[1].tolist() == pytest.approx([expected[0], 8.0])
+    for reading, beyond in ((50.0, True), (24.0, False)):  # one run has one deviation
+        state, deviation = model.step(model.init([20.0]), np.array([reading]), 0.0)
+        assert (np.shape(deviation), state.outside.tolist()) == ((), [beyond])
 
 
 def test_margin_widens_the_trained_range() -> None:
@@ -207,6 +210,12 @@ def test_terms_of_differences() -> None:
     assert table.names() == ("(T2-T3)", "(T2-T3)*(T2-T3)", "(T2-T3)*T1", "T1")
     assert table.evaluate(np.array([2.0, 7.0, 4.0])).tolist() == [3.0, 9.0, 6.0, 2.0]
     assert table.inputs_of(2) == {0, 1, 2}
+    assert table.evaluate(np.array([[[2.0, 7.0, 4.0]], [[1.0, 4.0, 6.0]]])).tolist() == [
+        [[3.0, 9.0, 6.0, 2.0]],
+        [[-2.0, 4.0, -2.0, 1.0]],
+    ]
+    none = TermTable(3, table.variables, ())
+    assert none.evaluate(np.zeros((2, 5, 3))).shape == (2, 5, 0)
     with pytest.raises(InputError, match="no input is named 'T9'"):
         Variable.difference(names, "T9", "T1")
 

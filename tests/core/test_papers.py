@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from thermocomp.core.correction import Deviation
+from thermocomp.core.expression import Constant, Node, Power, Product, Sum, sum_weighted
+from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.provenance import Provenance
-from thermocomp.core.terms import Term, Variable
+from thermocomp.core.terms import Term, TermTable, Variable
 from thermocomp.files import modelfile
 
 
@@ -140,3 +142,19 @@ def test_round_trip_keeps_every_bit() -> None:
     assert again == models
     assert modelfile.dumps(again) == modelfile.dumps(models)
     assert at(again[0], 1.1, 2.2, 3.3, 4.4, 5.5, 6.6) == at(chen_dx(), 1.1, 2.2, 3.3, 4.4, 5.5, 6.6)
+
+
+def test_terms_as_expressions() -> None:
+    """C-18, H-12: a square is a power, a product of two is none; nothing is added where there is no constant."""
+    names = ["T1", "T2", "T3"]
+    leaves = [Leaf(k, name) for k, name in enumerate(names)]
+    variables = (Variable.single("T1", 0), Variable.difference(names, "T2", "T3"))
+    terms = TermTable(3, variables, ((0,), (0, 0), (0, 1), (0, 0, 0), (0, 1, 1))).expressions(leaves)
+    one, two = leaves[0], variables[1].expression(leaves)
+    products = (Product((one, two)), Product((one, two, two)))
+    assert terms == (one, Power(one, 2), products[0], Power(one, 3), products[1])
+    weighted: list[Node] = [Product((Constant(1.0), terms[0])), Product((Constant(-2.0), terms[2]))]
+    assert sum_weighted((1.0, 0.0, -2.0), terms[:3]) == Sum(tuple(weighted))
+    assert sum_weighted((1.0, 0.0, -2.0), terms[:3], 5.0) == Sum((Constant(5.0), *weighted))
+    # every input with a weight counts, also one of 1
+    assert replace(hwang(), coefficients=(1.0, 0.0, 1.0, 1.0)).sensors == ("T7", "T2", "T6")

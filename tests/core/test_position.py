@@ -1,9 +1,12 @@
 """PositionModel: profile + offset + slopes (C-04, C-05, C-24)."""
 
+import math
+
 import numpy as np
 import pytest
 from volumetricmachine import line
 
+from thermocomp.core.correction import Correction, Deviation
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.position import PositionModel, slope_unit
 from thermocomp.core.profile import PolynomialProfile
@@ -83,3 +86,11 @@ def test_models_that_are_none(change: dict[str, object], message: str) -> None:
 
 def test_units_of_the_factors() -> None:
     assert [slope_unit("urad", k) for k in range(4)] == ["urad", "urad/m", "urad/m^2", "urad/m^3"]
+
+
+def test_a_slope_counts_from_its_reference_position() -> None:
+    """C-04, P-06: 2 um and 30 um/m, 400 mm from where they were learned; the correction is the opposite."""
+    deviation = Deviation(2.0, 30.0, 100.0)
+    assert deviation.at(500.0) == pytest.approx(14.0, rel=1e-14)
+    assert Correction.opposing(deviation) == Correction(-2.0, -30.0, 100.0)
+    assert math.copysign(1.0, Correction.opposing(Deviation(0.0)).offset) == 1.0

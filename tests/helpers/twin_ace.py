@@ -48,9 +48,16 @@ def level(values: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def fit(
-    T: FloatArray, S: FloatArray, half: int, tolerance: float, max_sweeps: int, *, twice: bool = False
+    T: FloatArray,
+    S: FloatArray,
+    half: int,
+    tolerance: float,
+    max_sweeps: int,
+    *,
+    twice: bool = False,
+    momentum: float = 0.0,
 ) -> Transforms:
-    """Fit theta(S) = sum of phi_j(T_j)."""
+    """Fit theta(S) = sum of phi_j(T_j); `momentum`: at most this share of the last change is added to a sweep's."""
     n, p = T.shape
     smooth = triangle if twice else expectation
     s = (S - S.mean()) / S.std()
@@ -62,7 +69,9 @@ def fit(
             break
     errors: list[float] = []
     theta = np.zeros(n)
+    last, moved, age = np.zeros((p, n)), 0.0, 0
     for _ in range(max_sweeps):
+        before = phi.copy()
         theta = smooth(phi.sum(axis=0), S, half)
         norm = np.sqrt(np.mean(theta**2))
         if norm <= VANISHES:
@@ -74,6 +83,9 @@ def fit(
         errors.append(float(np.mean((theta - phi.sum(axis=0)) ** 2)))
         if len(errors) > 1 and not errors[-2] - errors[-1] > tolerance:
             break
+        previous, moved = moved, float(np.sqrt(np.sum((phi - before) ** 2) / n))
+        age = 0 if len(errors) == 1 or moved > previous else age + 1
+        phi, last = phi + min(momentum, age / (age + 3)) * (phi - last), phi.copy()
     total = phi.sum(axis=0)
     psi = abs(np.mean(theta * total)) / np.sqrt(np.mean(theta**2) * np.mean(total**2))
     return Transforms(theta, phi, float(psi), errors)

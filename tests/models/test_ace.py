@@ -79,6 +79,26 @@ def test_kernel_is_the_paper_literally(seed: int, n: int, p: int, half: int, tie
     assert psi == pytest.approx(expected.psi, abs=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_first_variable_that_tells_something_begins(seed: int) -> None:
+    """W-03: one that does not change is passed over; where nothing changes there is nothing to transform."""
+    rng = np.random.default_rng(seed)
+    T = np.cumsum(rng.normal(size=(40, 3)), axis=0)
+    S = T[:, 1] ** 2 + T[:, 2]
+    T[:, 0] = 7.0
+    expected = twin_ace.fit(T, S, 5, 1e-9, 20)
+    theta, phi, psi, errors = kernel_fit(T, S, 5, 1e-9, 20)
+    np.testing.assert_allclose(errors, expected.errors, atol=1e-12)
+    np.testing.assert_allclose(theta, expected.theta, atol=1e-12)
+    np.testing.assert_allclose(phi, expected.phi, atol=1e-12)
+    assert psi == pytest.approx(expected.psi, abs=1e-12)
+    for nothing in (T, np.full((40, 3), 7.0)):
+        theta, phi, psi, errors = kernel_fit(nothing, S if nothing is not T else np.full(40, 3.0), 5, 1e-9, 20)
+        assert (psi, len(errors)) == (0.0, 0)
+        assert not theta.any()
+        assert not phi.any()
+
+
 @pytest.mark.parametrize("n", [2, 5, 63, 64, 300, 9000])
 @pytest.mark.parametrize("kind", ["plain", "quantised", "outlier", "constant", "huge"])
 def test_ranks_are_those_of_a_stable_sort(n: int, kind: str) -> None:
@@ -147,6 +167,33 @@ def test_converged_kernel_is_the_limit_of_its_twin(seed: int, n: int, p: int, ha
     again = twin_ace.fit(T, S, half, -1.0, 300, twice=True)
     assert psi >= again.psi - 1e-6
     assert errors[-1] <= again.errors[-1] + 1e-6 if again.errors else psi == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_sweeps_are_accelerated_as_by_the_twin(seed: int) -> None:
+    """W-03: the momentum grows with the sweeps since a change was larger than the one before it."""
+    from thermocomp.models.kernels import ace as kernel
+    from thermocomp.models.kernels import ranks
+
+    rng = np.random.default_rng(seed)
+    T = np.cumsum(rng.normal(size=(50, 3)), axis=0)
+    S = T[:, 0] ** 2 / 5 + T[:, 1] + rng.normal(size=50)
+    ranked = ranks.rank(np.ascontiguousarray(np.vstack([T.T, S])))
+    *_, errors = kernel.solve(*ranked, 4, 0.0, 25, True)
+    twin = twin_ace.fit(T, S, 4, -np.inf, 25, twice=True, momentum=0.95)
+    assert len(errors) == 25
+    np.testing.assert_allclose(errors, twin.errors, rtol=0, atol=1e-9)
+
+
+def test_correlation_of_the_kernel() -> None:
+    """W-02: Pearson's of what has no mean, whatever its size; none with what does not vary."""
+    from thermocomp.models.kernels.ace import _correlation
+
+    x, y = np.random.default_rng(0).normal(size=(2, 30))
+    x, y = x - x.mean(), y - y.mean()
+    for scale in (1.0, -1e-4):
+        assert _correlation(scale * x, y) == pytest.approx(abs(np.corrcoef(x, y)[0, 1]), rel=1e-12)
+    assert _correlation(np.zeros(30), y) == 0.0
 
 
 def test_stop_rules() -> None:
@@ -263,6 +310,12 @@ def test_theta_that_is_not_monotone_is_told_and_cured() -> None:
     # E-W5
     T, y = bent(6, 300, noise=2.0)
     assert 0 < ACE().fit(T, y).falling_theta_ < 1
+    tied = ACE().fit(T, np.round(4 * y) / 4)
+    distinct, first = np.unique(tied.theta_.x, return_index=True)
+    assert len(distinct) < len(y)
+    assert tied.falling_theta_ == np.mean(np.diff(tied.theta_.y[first]) < 0) > 0
+    still = ACE().fit(T, np.full(len(y), 7.0))  # nothing rises or falls, and nothing is needed to predict it
+    assert (still.falling_theta_, still.psi_, still.freeze(target="z").inputs) == (0.0, 0.0, ())
     m = MonotoneACE().fit(T, y)
     assert m.falling_theta_ == 0
     assert (np.diff(m.theta_.y) >= 0).all()

@@ -192,6 +192,14 @@ def test_hidden_nodes_are_judged_on_cycles_left_out(samples: Samples) -> None:
     linear = ARX(time="routed", inputs=["spindle_rpm"]).fit(X, y, dt=dt, cycle=cycle)
     searched = NetARX(time="routed", inputs=["spindle_rpm"], k=None, m=None, **QUICK).fit(X, y, dt=dt, cycle=cycle)
     assert (searched.k_, searched.m_) == (linear.k_, linear.m_)  # E-P2: the same search
+    # a net that has not seen the cycle on which it is judged
+    for tried in e.trials_:
+        left_out = []
+        for fold in np.unique(cycle[cycle >= 0]):
+            own: dict[str, Any] = {"time": "routed", "inputs": ["spindle_rpm"], "hidden": tried.hidden, "epochs": 400}
+            without = NetARX(**own).fit(X, y, dt=dt, cycle=np.where(cycle == fold, -1, cycle))
+            left_out.append(np.sqrt(np.mean((y - without.predict(X, dt=dt))[cycle == fold] ** 2)))
+        assert tried.cv_rms == pytest.approx(np.mean(left_out), rel=1e-6)
 
 
 def test_measured_data(shared_data: Path) -> None:
@@ -338,6 +346,6 @@ def test_constant_and_copied_inputs_and_a_dead_probe() -> None:
 def test_orders_of_a_table_that_is_too_short() -> None:
     rng = np.random.default_rng(0)
     tri = triangle(join_columns(rng.normal(size=(3, 4)), rng.normal(size=3)), intercept=False)
-    found = orders.compute_orders(tri, 1, range(3), range(2))
+    found = orders.compute_orders(tri, 1, range(3), range(2), 1.0)
     assert [o.admissible for o in found if o.n_parameters >= 3] == [False] * 3
     assert orders.best([o for o in found if not o.admissible], "fpe") is None

@@ -118,6 +118,21 @@ def test_initial_weights() -> None:
     assert -0.3 <= numbers.min() < -0.28
     assert 0.28 < numbers.max() <= 0.3
     assert abs(numbers.mean()) < 0.05
+    # which place each of them has: the loss of the first epoch is that of the net that is returned
+    trained = train_net(x, t, 20, rng=np.random.default_rng(0), rates=np.full(3, 1e-300))
+    assert trained.losses == pytest.approx([np.mean((t - net.evaluate(x)) ** 2)] * 3, rel=1e-12)
+
+
+def test_the_shuffling_has_a_seed_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """C-29: 64 random bits, drawn after the weights."""
+    _, x, t = problem((4, 5, 1))
+    seeds = []
+    monkeypatch.setattr(backprop, "train", lambda *given: seeds.append(int(given[8])) or np.zeros(1))  # type: ignore[func-returns-value]
+    for k in range(20):
+        train_net(x, t, 5, rng=np.random.default_rng(k), rates=np.ones(1))
+    assert len({*seeds}) == 20
+    assert min(seeds) < 2**63 < max(seeds) < 2**64
+    assert max(s & 0xFFFFFFFF for s in seeds) > 2**31
 
 
 @pytest.mark.parametrize("schedule", ["geometric", "harmonic"])

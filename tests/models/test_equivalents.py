@@ -140,6 +140,8 @@ def test_too_few_data_sets() -> None:
     assert held.equivalent.all()
     assert "(Holm)" in held.notes[0]
     assert equivalents([values[:, :1]], subsets).equivalent.all()
+    assert equivalents([values[:, :5]], subsets, level=2 / 32).notes == ()  # the smallest one, not above it
+    assert equivalents([values[:, :5]], subsets, level=0.0624).notes != ()
 
 
 def test_ties_and_one_set_alone() -> None:

@@ -100,6 +100,32 @@ def test_statistics_are_those_of_the_residual(estimator: TermRegressor) -> None:
     whole = LeastSquares().fit(np.random.default_rng(0).normal(size=(5, 4)), np.arange(5.0) ** 2)
     assert np.isnan([whole.standard_error_, whole.adjusted_r_squared_]).all()
     assert effective_sample_size(np.zeros(50)) == 50
+    six = np.random.default_rng(0).normal(size=(6, 4))
+    one_left = LeastSquares().fit(six, np.arange(6.0) ** 2)  # one degree of freedom
+    residual = np.arange(6.0) ** 2 - one_left.predict(six)
+    assert one_left.standard_error_ == pytest.approx(np.sqrt(residual @ residual))
+    assert 1 - one_left.adjusted_r_squared_ == pytest.approx(5 * (1 - one_left.r_squared_))
+    small = LeastSquares().fit(T, 1e-6 * y)
+    assert small.r_squared_ == pytest.approx(LeastSquares().fit(T, y).r_squared_)
+
+
+@pytest.mark.parametrize("n", [10, 37, 300])
+def test_effective_sample_size_by_hand(n: int) -> None:
+    """C-19, E-C12: the autocorrelations before the first that is not positive, added up one by one."""
+    noise = np.random.default_rng(n).normal(size=n)
+    for memory in (0.0, 0.8, 0.99):
+        residual = noise.copy()
+        for k in range(1, n):
+            residual[k] += memory * residual[k - 1]
+        r = residual - residual.mean()
+        total = 0.0
+        for lag in range(1, n):
+            covariance = float(r[lag:] @ r[:-lag])
+            if covariance <= 0:
+                break
+            total += covariance / float(r @ r)
+        for scale in (1.0, 1e-3):
+            assert effective_sample_size(scale * residual) == pytest.approx(n / (1 + 2 * total), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -198,6 +224,25 @@ def test_log_text_in_the_style_of_systat() -> None:
     rows = dict(re.findall(r"^(\S+)\s+(-?[\d.e+-]+)$", text.split("COEFFICIENT\n")[1], re.MULTILINE))
     assert list(rows) == list(m.terms_)
     np.testing.assert_allclose([float(v) for v in rows.values()], m.coef_, rtol=1e-5)
+    told = {w: float(v) for w, v in re.findall(r"(SQUARED MULTIPLE R|MULTIPLE R|SAMPLE SIZE): (\S+)", text)}
+    # the adjusted one is the last of its name
+    numbers = (np.sqrt(m.r_squared_), m.adjusted_r_squared_, m.n_effective_)
+    for name, value in zip(("MULTIPLE R", "SQUARED MULTIPLE R", "SAMPLE SIZE"), numbers, strict=True):
+        assert told[name] == pytest.approx(value, abs=0.051 if name == "SAMPLE SIZE" else 6e-4)
+
+
+def test_predictors_are_wrapped_between_names() -> None:
+    """C-16: as many as fit into 100 columns; a name is never divided."""
+    m = PartialF().fit(*drift())
+    for names, lines in (
+        (("a" * 49, "b" * 48, "c"), (2, 1)),  # 49 + 48 + 3 are 100
+        (("a" * 49, "b" * 49, "c"), (1, 2)),
+        (("front-" * 20 + "x", "c"), (1, 1)),
+        (("d" * 130,), (1,)),
+    ):
+        m.terms_, m.coef_ = names, np.arange(float(len(names)))
+        wrapped = m.log_text().split("FOLLOWING PREDICTORS:\n\n")[1].split("\n\n")[0].splitlines()
+        assert tuple(len(line.strip(",").split(", ")) for line in wrapped) == lines
 
 
 def test_log_text_tells_what_f_means() -> None:

@@ -180,6 +180,15 @@ def test_displacements_are_not_interpolated_over_gaps() -> None:
     np.testing.assert_allclose(run.phase, [0, 0, 0, 0, 0, 0, 0.5, 0.5])
 
 
+def test_a_gap_of_one_and_a_half_steps_is_none() -> None:
+    """P-05: between rows 90 s apart a displacement is interpolated, between those 95 s apart it is not."""
+    dt = np.array([np.inf, 60.0, 60.0, 60.0, 90.0, 60.0, 60.0, 95.0, 60.0])
+    y: FloatArray = np.arange(9.0)
+    runs = ticks.put_on_clock(np.ones((9, 1)), dt, 60.0)
+    (found,) = ticks.displacements(runs, y, dt, np.ones(9, dtype=np.bool_), 60.0)
+    np.testing.assert_allclose(found, [0, 1, 2, 3, 3 + 2 / 3, 4.5, 5.5, np.nan, np.nan, 7 + 55 / 60])
+
+
 # -- output error --
 
 

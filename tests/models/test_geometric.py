@@ -1,6 +1,8 @@
 """The order of a cold profile with few stations (ISO 230-2 asks for five), and what repeated values tell of it."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from profilemachine import along_y
 
 from thermocomp.core.profile import SplineProfile
 from thermocomp.virtual.geometry import PROFILES, cold_profile
-from thermocomp.volumetric.models.geometric import fit_profile
+from thermocomp.volumetric.models.geometric import _choose, fit_profile
 
 FloatArray = NDArray[np.float64]
 
@@ -159,3 +161,37 @@ def test_no_spline_where_the_profile_varies_with_other_axes() -> None:
     assert not any(t.through for t in found.tried)
     alone = fit_profile(points, cold_profile(points[:, 1]) + 0.01 * points[:, 0], "Y", coordinates="Y")
     assert any(t.through for t in alone.tried)
+
+
+def tried(left_out: float, n_terms: int = 1, **more: Any) -> Any:
+    """Return what was found with a candidate."""
+    return SimpleNamespace(
+        **{"left_out": left_out, "n_terms": n_terms, "margin": 0.0, "misfit": np.nan, "through": False} | more
+    )
+
+
+def test_the_lowest_order_within_the_margin_of_the_best() -> None:
+    """C-06: squares are compared; what is exactly within, is within."""
+    best = tried(0.5, 3, margin=0.75)
+    for first, chosen in ((1.0, 0), (1.001, 1), (np.nan, 1)):
+        candidates = [tried(first), best, tried(0.6, 4)]
+        assert _choose(candidates, 12) is candidates[chosen]
+    # an order that leaves more than the noise is not chosen if there is another one, whatever its error
+    for misfit, chosen in ((0.0099, 1), (0.01, 0)):
+        candidates = [tried(0.1, misfit=misfit), tried(5.0, 2, misfit=0.5)]
+        assert _choose(candidates, 12) is candidates[chosen]
+    for left_out, chosen in ((9.0, 1), (np.inf, 0)):
+        candidates = [tried(0.1, misfit=0.001), tried(left_out, 12, through=True)]
+        assert _choose(candidates, 12) is candidates[chosen]
+
+
+@pytest.mark.parametrize(
+    ("n_own", "n_terms", "misfit", "share"),
+    [(12, 1, np.nan, 0.5), (9, 2, np.nan, 0.5), (8, 2, np.nan, 1.25), (8, 1, np.nan, 1.0), (8, 2, 0.5, 0.5)],
+)
+def test_a_spline_must_be_better_by_a_share(n_own: int, n_terms: int, misfit: float, share: float) -> None:
+    """C-06: by half of the mean square; with up to eight positions, where nothing tells the noise, it may be worse."""
+    order = tried(2.0, n_terms, misfit=misfit)
+    for square, chosen in ((0.999 * share, "spline"), (1.001 * share, "order")):
+        spline = tried(2.0 * float(np.sqrt(square)), 12, through=True)
+        assert _choose([order, spline], n_own) is {"spline": spline, "order": order}[chosen]

@@ -54,6 +54,7 @@ def test_groups_follow_the_paper(C: FloatArray, threshold: float, absolute: bool
     found = grouping.group(C, threshold, absolute=absolute)
     assert [list(g) for g in found] == twin.grouped(C, threshold, absolute)
     assert sorted(k for g in found for k in g) == list(range(len(C)))
+    assert absolute or found == grouping.group(C, threshold)
     for seed, *others in found:
         assert all((abs(C[seed, k]) if absolute else C[seed, k]) > threshold for k in others)
 
@@ -129,6 +130,10 @@ def test_correlation_is_pearsons() -> None:
     copied = correlation(X[:, [0, 0, 1, 2, 0]])
     assert copied[0, 1] == copied[0, 4] == 1.0
     assert np.array_equal(copied[0, 2:4], copied[4, 2:4])
+    # to twelve decimals
+    C, exact = correlation(X), np.corrcoef(X.T)
+    np.testing.assert_array_equal(C, np.round(C, 12))
+    assert np.abs(C - exact).max() < 6e-13
     X[:, 3] = 20.1
     with pytest.raises(FitError, match="column 3 is constant"):
         correlation(X)
@@ -199,6 +204,11 @@ def test_rounding_is_told_from_a_small_remainder(seed: int) -> None:
     assert grouping.representatives(tri(X, y + 1e-5 * X[:, 3]), groups) == (0, 3, 4)
     found = exhaustive.search_subsets(tri(X[:, :4], y), range(4))
     assert (found.best.columns, found.best.mse) == ((0,), 0.0)
+    # a column of zeros explains nothing, with or without a constant
+    X[:, 4] = 0.0
+    for intercept in (True, False):
+        whole = exhaustive.search_subsets(tri(X, X[:, 2] + 0.1 * X[:, 3] ** 2, intercept), range(5))
+        assert 4 not in whole.best.columns
 
 
 def test_sensors_that_almost_repeat_each_other() -> None:
@@ -305,6 +315,10 @@ def test_spectrum() -> None:
     copied = spectrum(X[:, [0, 1, 0]])
     assert (copied.smallest, copied.sum_inverse, copied.condition_number) == (0.0, np.inf, np.inf)
     assert spectrum(X[:2]).eigenvalues[2:] == (0.0, 0.0)
+    # nothing is what is small beside the greatest, not beside the next
+    assert spectrum(np.diag([1.0, 1e-10, 1e-15])).eigenvalues == pytest.approx((1.0, 1e-20, 0.0), rel=1e-9, abs=0.0)
+    two = spectrum(np.diag([1.0, 0.5]))
+    assert (two.smallest, two.sum_inverse, two.condition_number) == pytest.approx((0.25, 5.0, 4.0))
     none = spectrum(X[:, :0])
     assert none.eigenvalues == ()
     assert none.sum_inverse == 0

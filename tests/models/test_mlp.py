@@ -15,7 +15,7 @@ from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.network import Network
 from thermocomp.files import modelfile
 from thermocomp.models.base import ThermalRegressor
-from thermocomp.models.mlp import PATIENCE, SigmoidNet
+from thermocomp.models.mlp import PATIENCE, HiddenCount, SigmoidNet
 from thermocomp.models.mlp_sklearn import SklearnNet
 from thermocomp.models.nets import NetRegressor, thin_rows
 from thermocomp.models.numerics.backprop import scaling_in, scaling_out, train_net
@@ -134,6 +134,10 @@ def test_caution_about_more_parameters_than_rows() -> None:
     fitted = SigmoidNet(hidden=2, n_epochs=500).fit(x, x[:, 0] + 0.1 * rng.normal(size=500))
     assert fitted.caution_ == ""
     assert fitted.n_effective_ > 100
+    # as many rows as parameters, all independent: not more parameters than rows
+    x, alternating = np.linspace(0.0, 1.0, 7)[:, None], np.array([1.0, -1, 1, -1, 1, -1, 1])
+    fitted = SigmoidNet(hidden=2, n_epochs=1).fit(x, alternating)
+    assert (fitted.n_parameters_, fitted.n_patterns_, fitted.n_effective_, fitted.caution_) == (7, 7, 7.0, "")
 
 
 @pytest.mark.parametrize(
@@ -208,6 +212,20 @@ def test_sweep_ends_when_there_is_no_gain() -> None:
     means = [t.mean for t in tried]
     assert len(tried) < 29
     assert len(tried) - 1 - int(np.argmin(means)) == PATIENCE
+
+
+@pytest.mark.parametrize("best", [0, 3])
+def test_patience_counts_from_the_best(monkeypatch: pytest.MonkeyPatch, best: int) -> None:
+    """C-26: as many nodes more as it is patient, wherever the best one was."""
+    monkeypatch.setattr(
+        "thermocomp.models.mlp.HiddenCount", lambda n, _: HiddenCount(n, (9.0 - n if n <= best + 1 else 9.0 + n,))
+    )
+    X, y = drift(60)
+    fitted = SigmoidNet(hidden=range(1, 20), n_epochs=1, jobs=1).fit(X, y[:, 0], cycle=np.repeat([0, 1], 30))
+    assert len(fitted.sweep_) == best + 1 + PATIENCE
+    assert fitted.n_hidden_ == best + 1
+    assert HiddenCount(3, (2.5,)).standard_error == 0.0
+    assert HiddenCount(3, (2.0, 3.0)).standard_error == pytest.approx(0.5)
 
 
 def test_an_interrupted_sweep_goes_on_with_what_it_has(monkeypatch: pytest.MonkeyPatch) -> None:

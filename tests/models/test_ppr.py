@@ -92,6 +92,10 @@ def test_chosen_by_plain_refits_without_each_cycle() -> None:
     estimator = ProjectionPursuit(max_terms=2, rule="minimum").fit(X, y, cycle=cycle)
     assert (estimator.degrees_, estimator.n_terms_) == ((3.0, 6.0)[i], j + 1)
     assert estimator.cv_rms_ == pytest.approx(rms.mean(axis=2).min())
+    r_squared = 1 - np.sum((y - estimator.predict(X)) ** 2) / np.sum((y - y.mean()) ** 2)
+    assert estimator.r_squared_ == pytest.approx(r_squared)
+    small = ProjectionPursuit(max_terms=2, rule="minimum").fit(X, 1e-6 * y, cycle=cycle)
+    assert small.r_squared_ == pytest.approx(r_squared)
     assert estimator.chosen_by_ == "4 thermal cycles, left out in turn"
     order = np.random.default_rng(0).permutation(len(y))
     other = ProjectionPursuit(max_terms=2, rule="minimum").fit(X.iloc[order], y[order], cycle=cycle[order])

@@ -1,6 +1,7 @@
 """First screening by correlation, on variables whose correlations are known (C-11)."""
 
 import numpy as np
+import pytest
 
 from thermocomp.models.selection.collinearity import screen
 
@@ -51,3 +52,20 @@ def test_copies_and_still_ones_are_not_kept() -> None:
     assert np.isnan(found.relevance[:, 1]).all()
     assert found.nearest(2) == 1
     assert screen(X, np.zeros((50, 1)), 4).kept == ()
+
+
+@pytest.mark.parametrize(("like_first", "second"), [(0.55, 1), (0.565, 2)])
+def test_squares_decide(like_first: float, second: int) -> None:
+    """C-11: r .9, .6 and .5; the last is correlated by .1 with the first: .36 (1 - s^2) against .25 (1 - .01)."""
+    rest = np.sqrt(0.19)
+
+    def row(r: float, s: float, own: int) -> tuple[float, ...]:
+        along = (s - 0.9 * r) / rest
+        weights = [r, along, 0.0, 0.0]
+        weights[own] = np.sqrt(1 - r**2 - along**2)
+        return tuple(weights)
+
+    X = mixed((0.9, rest, 0, 0), row(0.6, like_first, 2), row(0.5, 0.1, 3))
+    found = screen(X, orthogonal(4)[:, [0]], 2)
+    np.testing.assert_allclose(found.likeness[0], [1, like_first, 0.1], atol=1e-12)
+    assert found.kept == (0, second)

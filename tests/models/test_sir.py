@@ -68,6 +68,10 @@ def test_it_takes_the_leading_directions() -> None:
     model = SlicedInverse(directions=1).fit(X, 10 * X[:, 3] + 5 * X[:, 7])
     assert model.coef_[[3, 7]] == pytest.approx([10, 5], abs=1)
     assert np.abs(np.delete(model.coef_, [3, 7])).max() < 1
+    y = 10 * X[:, 3] + 5 * X[:, 7] + 40  # about zero, if there is no constant
+    through_zero = SlicedInverse(fit_intercept=False).fit(X, y)
+    left = y - through_zero.predict(X)
+    assert through_zero.r_squared_ == pytest.approx(1 - left @ left / (y @ y))
 
 
 def test_frozen_it_says_the_same_without_constant_temperatures() -> None:

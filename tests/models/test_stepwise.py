@@ -18,6 +18,7 @@ from thermocomp.models.numerics.stepwise import (
     FThresholds,
     Rule,
     StepwiseSelection,
+    _Tableau,
     alpha_of_f,
     f_of_alpha,
     r_squared_of_f,
@@ -99,7 +100,16 @@ def test_f_rule_follows_the_equations(
     X, y = problem
     enter, delete = thresholds
     expected = transcribed(X, y, lambda _: enter, lambda _: delete, intercept)
-    same(run(X, y, FThresholds(enter, delete), intercept=intercept), expected)
+    found = run(X, y, FThresholds(enter, delete), intercept=intercept)
+    same(found, expected)
+    inside: list[int] = []
+    r_squared = 0.0
+    for number, s in enumerate(found.steps, start=1):
+        before, n_before = r_squared, len(inside)
+        inside = [*inside, s.index] if s.action == "enter" else [k for k in inside if k != s.index]
+        r_squared = 1 - sse(X, y, inside, intercept) / sse(X, y, [], intercept)
+        assert (s.number, s.df) == (number, len(y) - intercept - max(n_before, len(inside)))
+        assert (s.r_squared, s.r_squared_step) == pytest.approx((r_squared, r_squared - before), abs=1e-9)
 
 
 @given(problems(), st.sampled_from([(0.001, 0.015), (0.05, 0.1), (0.15, 0.15)]), st.booleans())
@@ -207,6 +217,51 @@ def test_a_term_whose_f_is_the_threshold_stays() -> None:
     found = run(X, y, FThresholds(10.0, 9.0))
     assert [(s.action, s.index) for s in found.steps[:1] + found.steps[-1:]] == [("enter", 0), ("remove", 0)]
     assert run(X, y, FThresholds(10.0, found.steps[-1].f)).selected == (0, 1, 2)
+    assert run(X, y, FThresholds(found.steps[0].f, 1.0)).steps[0].index == 0  # enters at the threshold, too
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_of_equal_candidates_the_first_enters(seed: int) -> None:
+    """C-17, T-04: whatever the rounding."""
+    a, b = np.random.default_rng(seed).normal(size=(2, 60))
+    for copies in ([a, a / 3.0, 0.7 * a], [0.7 * a, a, a / 3.0], [a / 3.0, 0.7 * a, a]):
+        assert run(np.column_stack([b, *copies]), a + 0.1 * b, FThresholds()).steps[0].index == 1
+
+
+def test_whatever_the_threshold_a_degree_of_freedom_is_left() -> None:
+    """T-02, T-04: of six columns and five rows three enter, and never one that is zero."""
+    X = np.random.default_rng(17).normal(size=(5, 6))
+    X[:, 0] = 0.0
+    y = np.array([0.0, 1.0, 4.0, 9.0, 20.0])
+    found = run(X, y, FThresholds(0.0, 0.0))
+    assert len(found.selected) == 3
+    assert 0 not in found.selected
+    assert [s.df for s in found.steps] == [3, 2, 1]
+    assert run(X[:, :1], y, FThresholds(0.0, 0.0)).steps == ()
+
+
+def test_the_rotated_triangle_is_that_of_the_same_table() -> None:
+    """C-17, T-05: its product with itself does not change when columns enter and leave in any order."""
+    rng = np.random.default_rng(18)
+    work = _Tableau(triangle(join_columns(rng.normal(size=(40, 6)), rng.normal(size=40)), intercept=True), 1e-8)
+    product = work._rows.T @ work._rows
+    for action, index in [
+        *(("enter", k) for k in (4, 1, 5, 0)),
+        ("remove", 4),
+        ("enter", 2),
+        ("remove", 5),
+        ("remove", 0),
+    ]:
+        (work.enter if action == "enter" else work.remove)(index)
+        np.testing.assert_allclose(work._rows.T @ work._rows, product, atol=1e-12)
+        np.testing.assert_array_equal(np.tril(work._rows[:, work.active], -1), 0.0)
+        left = 1 - product[work.active, -1] @ np.linalg.solve(
+            product[np.ix_(work.active, work.active)], product[work.active, -1]
+        )
+        assert work.sse == pytest.approx(left, rel=1e-9)
+        assert work.df == 39 - len(work.active)
+        np.testing.assert_array_equal(np.flatnonzero(np.isinf(work._now)), sorted(work.active))
+    assert work.active == [1, 2]
 
 
 def test_a_rule_that_goes_round_is_stopped() -> None:

@@ -1,12 +1,15 @@
 """When a correction is renewed, and how far it may go."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from nc_law import Growing, Steady
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.nc.interpreter.block import Point
+from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand, oppose_deviation
 from thermocomp.nc.rewrite.text import Vector
 
@@ -46,6 +49,16 @@ def test_a_small_change_is_taken_when_it_is_due() -> None:
     assert demand.at(600.0, drift, HERE)[2] == -3.4
 
 
+def test_what_moved_by_the_tolerance_stays() -> None:
+    """P-06: each axis for itself, once one of them has moved by more."""
+    drift, demand = SimpleNamespace(deviation=lambda _: (2.0, 0.0, 3.0)), Demand(1.0)
+    assert demand.at(0.0, drift, HERE) == (-2.0, 0.0, -3.0)
+    drift.deviation = lambda _: (3.0, -1.0, 4.0)
+    assert demand.at(1.0, drift, HERE) == (-2.0, 0.0, -3.0)
+    drift.deviation = lambda _: (3.0, -1.25, 4.0)
+    assert demand.at(2.0, drift, HERE) == (-2.0, 1.25, -3.0)
+
+
 def test_a_drift_that_changes_its_sign_is_followed() -> None:
     """P-06, E-P4: the correction is minus the deviation, so one of the same sign is as wrong as can be."""
     drift, demand = _Set(3.0), Demand(1.0)
@@ -76,3 +89,16 @@ class _Set(Steady):
 def test_what_is_no_thermal_drift_is_refused(z: float, said: str, every: float | None) -> None:
     with pytest.raises(InputError, match=said):
         Demand(1.0, every).at(0.0, _Set(z), HERE)
+
+
+@pytest.mark.parametrize("optional", [False, True])
+@pytest.mark.parametrize("moved", [False, True])
+def test_an_axis_placed_by_an_optional_line_is_in_doubt(optional: bool, moved: bool) -> None:
+    """P-06: it is fixed no more; where it is, is known if the line is run for certain."""
+    doubts: list[tuple[int, float]] = []
+    state: Any = SimpleNamespace(fixed=[True] * 3, doubtful=[True] * 3, doubt=lambda *d: doubts.append(d))
+    block: Any = SimpleNamespace(line=SimpleNamespace(optional=optional))
+    Coordinates._placed(state, block, 1, 4.5, moved=moved)
+    assert state.fixed == [True, False, True]
+    assert state.doubtful == [True, optional, True]
+    assert doubts == [(1, 4.5)] * (optional and moved)

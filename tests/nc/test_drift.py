@@ -347,3 +347,14 @@ def test_stations_come_in_their_order() -> None:
     stations = ladder([lags(), lags()], (0.0, 200.0))[::-1]
     with pytest.raises(InputError, match="ordered"):
         Drift(stations, start.begin_cold(stations, {}))
+
+
+def test_an_axis_without_a_model_stays() -> None:
+    """P-04."""
+    for axis in ("X", "Y", "Z"):
+        stations = [Station(axis, ticking(f"{axis.lower()}_um"), shadow=True)]
+        drift = Drift(stations, start.begin_cold(stations, {}), {})
+        drift.advance(1800.0, 3000.0)
+        (value,) = drift.values
+        assert value != 0.0
+        assert drift.deviation((1.0, 2.0, 3.0)) == tuple(value if a == axis else 0.0 for a in "XYZ")

@@ -4,16 +4,25 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from thermocomp.models.mlp import SigmoidNet
 from thermocomp.papers.chen1996 import law
 from thermocomp.papers.chen1996.law import DESIGNS, OURS, Law, Recovery
-from thermocomp.papers.chen1996.setup import EQ6, EQ8, TEMPERATURES
+from thermocomp.papers.chen1996.setup import EQ6, EQ8, SLOPE_VARIABLES, TEMPERATURES
 from thermocomp.papers.study import FloatArray
 from thermocomp.volumetric.models.position import PositionOptions, slope_samples
 
 DAYS = range(3)
+#: experiments and days of which the temperatures were taken
+ASKED: list[tuple[str, int]] = []
+TEMPERATURES_OF = law.temperatures
+
+
+def asked(experiment: str, day: int) -> list[FloatArray]:
+    ASKED.append((experiment, day))
+    return TEMPERATURES_OF(experiment, day)
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +36,7 @@ def sought() -> Law:
         patch.setattr(law, "SigmoidNet", partial(SigmoidNet, n_epochs=500))
         for name, value in {"DAYS": 2, "DRAWS": 20, "FEWER": 10}.items():
             patch.setattr(law, name, value)
+        patch.setattr(law, "temperatures", asked)
         return law.seek(5)
 
 
@@ -47,6 +57,26 @@ def test_what_is_planted_are_the_paper_s_equations(days: list[list[FloatArray]])
         k1 = 0.465 * t["T3"] + 2.705 * t["T4"] + 3.675 * (t["T6"] - t["T8"]) - 5.589 * (t["T7"] - t["T9"])
         np.testing.assert_allclose(m.errors[:, 10] - m.errors[0, 10], 0.5 * k1, atol=1e-9)
         np.testing.assert_allclose(m.profiles("test").slopes().factors[:, 0], k1, atol=1e-9)
+
+
+def slope(rise: FloatArray) -> FloatArray:
+    """Return the slope of Eq. 8, as printed."""
+    t = dict(zip(TEMPERATURES, rise.T, strict=True))
+    return np.asarray(0.465 * t["T3"] + 2.705 * t["T4"] + 3.675 * (t["T6"] - t["T8"]) - 5.589 * (t["T7"] - t["T9"]))
+
+
+def test_readings_are_means_over_runs_with_their_noise(days: list[list[FloatArray]]) -> None:
+    """C-23, C-24: five runs of the laser make a profile; each reading has its own error, added to the truth."""
+    made, rng = law.plant(days[1], OURS, np.random.default_rng(7)), np.random.default_rng(7)
+    assert (OURS.runs, OURS.centred, OURS.hierarchy, OURS.laser, OURS.sensor) == (5, True, False, 0.3, 0.05)
+    assert (OURS.reference(3), replace(OURS, centred=False).reference(3)) == ([0, 1, 2], [0])
+    for true, m in zip(days[1], made, strict=True):
+        clean = EQ6(law.POSITIONS) + slope(true - true[0])[:, None] * law.POSITIONS / 1000
+        errors = clean + 0.3 * rng.standard_normal(clean.shape)
+        read = true + 0.05 * rng.standard_normal(true.shape)
+        for k in range(len(true) // 5):
+            np.testing.assert_allclose(m.errors[k], errors[5 * k : 5 * k + 5].mean(axis=0), rtol=0, atol=1e-9)
+            np.testing.assert_allclose(m.temperatures[k], read[5 * k : 5 * k + 5].mean(axis=0), rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("design", [OURS, replace(OURS, centred=False)])
@@ -114,3 +144,25 @@ def test_a_net_tells_no_law(sought: Law) -> None:
     numbers = law.numbers(sought)
     assert numbers["law_whole"] >= law.MOST
     assert numbers["law_elsewhere_net"] == sought.elsewhere["net"]
+
+
+def test_what_the_net_says_is_computed_by_hand(sought: Law) -> None:
+    """C-27: in training, without T1's part, and in one warm-up of another experiment; days follow each other."""
+    assert sorted(ASKED) == sorted((e, day) for e in {d.experiment for d in DESIGNS} for day in (5, 6))
+    first = law.plant(TEMPERATURES_OF(OURS.experiment, 5), OURS, np.random.default_rng(5))
+    cold = replace(OURS, centred=False)
+    change, k1 = (np.concatenate(v) for v in zip(*(m.counted(cold) for m in first), strict=True))
+
+    def table(rises: FloatArray) -> pd.DataFrame:
+        t = dict(zip(TEMPERATURES, rises.T, strict=True))
+        return pd.DataFrame({v: t[v[:2]] - t[v[3:]] if "-" in v else t[v] for v in SLOPE_VARIABLES})
+
+    X = table(change)
+    assert sought.net_r2 == pytest.approx(1 - np.sum((k1 - sought.net.predict(X)) ** 2) / np.sum(k1**2))
+    ends = [sought.net.predict(X.assign(T1=X["T1"].agg(end))) for end in ("min", "max")]
+    assert sought.idle == pytest.approx(np.abs(ends[1] - ends[0]).max())
+    (true,) = TEMPERATURES_OF("chen1996-slope", 5)
+    planted = slope(true - true[0])
+    assert sought.elsewhere["law"] == pytest.approx(np.sqrt(np.mean(planted**2)))
+    left = planted - sought.net.predict(table(true - true[0]))
+    assert sought.elsewhere["net"] == pytest.approx(np.sqrt(np.mean(left**2)))

@@ -95,6 +95,10 @@ def test_lengths_and_depths_have_gains_of_their_own() -> None:
 
 
 def test_the_measurement_has_the_uncertainty_that_is_stated() -> None:
+    milled, rng = np.random.default_rng(1).normal(size=(3, len(PLACES), 5, 3)), np.random.default_rng(2)
+    errors = rng.normal(0.0, 0.003 / np.sqrt(3)) * PLACES, rng.normal(0.0, 1.5 / np.sqrt(3), milled.shape)
+    expected = errors[0] + (milled + errors[1]).sum(axis=2) / 5  # of the scale, and of each point
+    np.testing.assert_allclose(measure(milled, np.random.default_rng(2)), expected, rtol=0, atol=1e-12)
     rng = np.random.default_rng(0)
     found = np.array([measure(np.zeros((1, len(PLACES), 5, 3)), rng)[0] for _ in range(4000)])
     assert np.std(found[:, 1, 1] - found[:, 0, 1]) == pytest.approx(part.uncertainty(450.0), rel=0.05)
@@ -113,3 +117,15 @@ def test_the_table_has_the_paper_s_numbers_beside_ours() -> None:
     assert [row[0] for row in table.rows] == [WITHOUT, MRA, NET, "the paper"]
     assert table.rows[-1][2:4] == ["92.4 -> 7.2", "12.8"]
     assert table.rows[1][2] == f"{part.numbers(found)['part_length_mra_um']:.1f}"
+
+
+def test_lengths_and_depths_of_several_days() -> None:
+    """C-37: between the walls of two places in Y, and between a floor in Z and the first one of the day."""
+    days = [np.random.default_rng(k).normal(size=(2, 4, len(PLACES), 3)) for k in range(2)]
+    lengths, depths = part._dimensions(("a", "b"), days)
+    for k, name in enumerate(("a", "b")):
+        rows = [(p[k, row], p[k, 0]) for p in days for row in (1, 2, 3)]
+        assert lengths[name].tolist() == [[r[1, 1] - r[0, 1], r[3, 1] - r[2, 1]] for r, _ in rows]
+        assert depths[name].tolist() == [[r[m, 2] - cold[0, 2] for m in range(4)] for r, cold in rows]
+        largest = (max(abs(np.ravel(lengths[name]))), max(abs(np.ravel(depths[name]))))
+        assert part._largest(lengths, depths)[name] == pytest.approx(largest)

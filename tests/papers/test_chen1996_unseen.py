@@ -144,3 +144,20 @@ def test_tenfold_is_ten_times_and_depths_shrink_as_printed(gain: float, tenfold:
             # all temperatures still rise at the last row: it has the largest error, 199 readings after the start
             assert "MRA" in claim.ours
             assert holds or f"occurs {199 * 6} min after a change of the spindle speed" in claim.finding
+
+
+def test_figures_14_to_17() -> None:
+    """C-36: z in both tests, z with the first draw of the noise, x without the spindle temperature."""
+    found = observed(TRUTH, {"T2": 1.5, "T3": 1.0}, {"T2": 2.0, "T3": 0.5})
+    constant, random = found.tests
+    noisy = common.with_noise(constant, 0.4, "uniform", 0)
+    expected = {14: ("z", constant), 15: ("z", random), 16: ("z", noisy), 17: ("x", found.cut)}
+    drawn = unseen.figures(found)
+    assert [f.key for f in drawn] == [f"chen1996-fig{number}" for number in expected]
+    for figure, (target, samples) in zip(drawn, expected.values(), strict=True):
+        (panel,) = figure.panels
+        assert [c.label for c in panel.curves] == ["measured", *found.models]
+        predicted = [common.predict_deviation(models[target], samples) for models in found.models.values()]
+        for curve, y in zip(panel.curves, [common.take_measured(samples, target), *predicted], strict=True):
+            np.testing.assert_array_equal(curve.x, samples.time / 3600)
+            np.testing.assert_array_equal(curve.y, y)

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from smallmachine import small_machine
 
 from thermocomp.cli.app import run
 from thermocomp.core.exceptions import InputError
+from thermocomp.judging.compare import compare as judging_compare
 from thermocomp.judging.robustness import stress
 from thermocomp.models.methods import METHODS
 from thermocomp.models.training import train
@@ -120,11 +123,55 @@ def test_a_method_that_cannot_be_fitted_is_told(recording: Recording) -> None:
     cells = next(r for r in table.rows if r[0] == "arx")
     assert cells[7].startswith("not fitted: there is no spindle speed")
     assert "resting, z_um, arx: rms_um" not in study.numbers
+    assert all(len(r) == len(t.header) for t in study.tables for r in t.rows)
+    # one method that could be fitted is enough for a finding, none is not
+    for methods, n_claims in ((("ols", "arx"), 1), (("arx",), 0)):
+        again = cross.run(0, methods=methods, experiments=[CrossExperiment("resting", "z_um")])
+        assert len(again.claims) == n_claims
+
+
+def test_numbers_of_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    """X-02: the middle number of sensors of the splits; the first of the errors with noise."""
+    monkeypatch.setattr(cross, "_fit_rms", lambda *_: 0.5)
+    robustness = SimpleNamespace(worst_lost=("t1_C", 9.0), noise_rms={"uniform": (3.0, 4.0), "normal": (5.0, 6.0)})
+    overall = SimpleNamespace(
+        robustness=robustness,
+        model="ols",
+        sensors=("t1_C",),
+        n_sensors=(1, 2, 4),
+        failure="",
+        fit_s=0.1,
+        metric=lambda name: {"rms": 1.0, "max_abs": 2.0, "peak_to_peak": 2.5}[name],
+    )
+    made = cross._row(SimpleNamespace(name="task"), overall, [])  # type: ignore[arg-type]
+    assert made == Row(
+        task="task",
+        method="ols",
+        fit_rms=0.5,
+        rms=1.0,
+        max_abs=2.0,
+        peak_to_peak=2.5,
+        noise_rms=3.0,
+        lost_rms=9.0,
+        lost="t1_C",
+        sensors=2,
+        fit_s=0.1,
+        failure="",
+    )
+    overall.sensors = ()
+    assert cross._row(SimpleNamespace(name="task"), overall, []).lost_rms == 1.0  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("machine")
-def test_one_table_of_all(recording: Recording) -> None:
+def test_one_table_of_all(recording: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[float] = []
+    jobs: list[int] = []
+
+    def compare(*given: Any, **more: Any) -> Any:
+        jobs.append(more["jobs"])
+        return judging_compare(*given, **more)
+
+    monkeypatch.setattr(cross, "compare", compare)
     study = cross.run(
         0,
         lambda share, _: told.append(share),
@@ -132,6 +179,7 @@ def test_one_table_of_all(recording: Recording) -> None:
         methods=("ols", "dynamic"),
         experiments=[CrossExperiment("moving", "z_um"), CrossExperiment("resting", "x_um")],
     )
+    assert jobs == [1] * 4  # one process, unless more are asked for
     assert told == sorted(told)
     assert told[-1] == 1.0
     overview, *tables = study.tables

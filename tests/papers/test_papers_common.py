@@ -58,6 +58,15 @@ def test_noise_is_on_the_temperatures_alone(law: str, largest: float, std: float
     assert not np.array_equal(noisy.values, common.with_noise(tests, 0.4, "uniform", seed=2).values)
 
 
+def test_the_noise_of_a_draw(tests: Samples) -> None:
+    """C-33: numpy's own numbers, one for each reading of a temperature."""
+    warm = np.array([c.quantity == "temperature" for c in tests.inputs])
+    shape = tests.values.shape
+    uniform, normal = (common.with_noise(tests, 0.4, law, 3).values - tests.values for law in ("uniform", "normal"))
+    np.testing.assert_allclose(uniform, np.random.default_rng(3).uniform(-0.4, 0.4, shape) * warm, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(normal, np.random.default_rng(3).normal(0.0, 0.4, shape) * warm, rtol=0, atol=1e-9)
+
+
 def test_a_sensor_that_is_cut_off_stays_at_its_zero(tests: Samples) -> None:
     name = tests.inputs[1].name
 

@@ -128,11 +128,43 @@ def test_a_room_that_changes_refutes_it(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_the_verification_is_another_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     """P-05: learned from the first test, judged in the second, with other speeds."""
-    monkeypatch.setattr(precompensation_setup, "record", lambda e, *, seed: made(e, seed=seed))
+    asked: list[tuple[str, int]] = []
+
+    def record(e: str | Experiment, *, seed: int) -> list[Recording]:
+        asked.append((e if isinstance(e, str) else e.name, seed))
+        return made(e, seed=seed, room=0.2 if e == "etve" else 0.0)
+
+    monkeypatch.setattr(precompensation_setup, "record", record)
     monkeypatch.setattr(precompensation_setup, "NetARX", partial(NetARX, hidden=2, epochs=20))
-    monkeypatch.setattr(precompensation_setup, "CUTS", 1)
+    monkeypatch.setattr(precompensation_setup, "CUTS", 2)
     monkeypatch.setattr(precompensation_setup, "INTERVALS", (600.0,))
-    c = precompensation_setup.compute(0, tell_nobody)
+    told: list[float] = []
+    c = precompensation_setup.compute(0, lambda share, _: told.append(share))
+    assert told == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.9])
+    cutting_tests = [("precompensation-cut", k) for k in (0, 1)]
+    both = [("precompensation", 0), *cutting_tests * 2, ("etve", 0), ("precompensation", 0)]
+    assert asked == both
+    assert (len(c.orders), c.hidden) == (4, [2] * 4)
+    assert c.room == pytest.approx(np.ptp(made("etve", seed=0, room=0.2)[0].table["z_um"]))
+    nets = c.models[precompensation_setup.NET]
+    for k in (0, 1):
+        (test,) = made("precompensation-cut", seed=k)
+        np.testing.assert_array_equal(c.cuts[k].scheduled, precompensation_setup.cut(test, nets).scheduled)
+        for function, cuts in c.between.items():
+            again = precompensation_setup.cut(test, nets, precompensation_setup.BETWEEN, function)
+            np.testing.assert_array_equal(cuts[k].scheduled, again.scheduled)
+    # one step ahead by least squares, at every position
+    steps = []
+    for k, channel in enumerate(c.learn.targets):
+        paper = ARX(inputs=("spindle_rpm",), time="routed", interval=600.0, k=1, m=0)
+        paper.fit(c.learn.frame(), c.learn.deviations[:, k], dt=c.learn.dt(), cycle=c.learn.cycle)
+        ahead = paper.one_step(c.judge.frame(), c.judge.deviations[:, k], dt=c.judge.dt())
+        steps.append(ahead[:, 1] - ahead[:, 0])
+        assert channel.name == f"z_at_{precompensation_setup.POSITIONS[k]}_um"
+    assert c.one_step == pytest.approx(rms(np.concatenate(steps)))
+    ((orders, _, least),) = c.clocks.values()
+    assert orders == (min(c.orders[0], key=lambda o: o.fpe).k, min(c.orders[0], key=lambda o: o.fpe).m)
+    assert least == pytest.approx(rms(c.left[precompensation_setup.LEAST][:, 0]))
     identification, verification = made("precompensation", seed=0)
     for samples, test in ((c.learn, identification), (c.judge, verification)):
         np.testing.assert_array_equal(samples.values[:, 0], test.table["spindle_rpm"])

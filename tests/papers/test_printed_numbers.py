@@ -286,6 +286,9 @@ def test_differences_are_those_of_table_2() -> None:
     needed = {tuple(name.split("-")) for row in TABLE_2.values() for name in row if "-" in name}
     assert set(chen.DIFFERENCES) == needed
     assert len(chen.DIFFERENCES) == 4
+    # in the order in which Table 2 uses them, which is that of their terms
+    used = dict.fromkeys(name for row in TABLE_2.values() for name in row if "-" in name)
+    assert ["-".join(pair) for pair in chen.DIFFERENCES] == [*used]
 
 
 def test_eq_6() -> None:
@@ -312,6 +315,10 @@ def test_sensors_of_hwang() -> None:
     assert HWANG_PLACES[:6] == tuple(screws)
     kinds = [place.rpartition("_")[2 if place.endswith("seat") else 0].split("_")[0] for place in HWANG_PLACES[6:]]
     assert kinds == ["seat", "seat", *["column"] * 4, "bed", "bed"]
+    # T14 is the rear of the bed; front before rear, right before left
+    ends = ("front_seat", "rear_seat"), ("bed_front", "bed_rear")
+    column = tuple(f"column_{end}_{side}" for end in ("front", "rear") for side in ("right", "left"))
+    assert HWANG_PLACES[6:] == (*ends[0], *column, *ends[1])
     assert tuple(f"T{k}" for k in range(1, 14 + 1)) == hwang.NAMES
     assert hwang.REFERENCE == "T14"
     assert sorted(k for group in hwang.TABLE_1 for k in group) == [*range(1, 13 + 1)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from thermocomp.models.numerics.leastsquares import effective_sample_size
 from thermocomp.models.partial_f import PartialF
 from thermocomp.papers import common, exported
 from thermocomp.papers.common import Errors
@@ -106,6 +107,16 @@ def test_what_a_first_temperature_has_to_explain() -> None:
     warm = stack(_of("stepwise2017", 0, few=True), ["x1_um"])
     found = stepwise2017_setup._thinned(warm, warm, 4)
     assert found.first == pytest.approx(100 / (100 + found.rows - 2), rel=1e-12)
+    online = stack(_of("stepwise2017-online", 0, few=True), ["x1_um"], HEAT)
+    some = stack(_of("stepwise2017", 0, few=True), ["x1_um"], HEAT)
+    rows = np.arange(0, len(some), 4)
+    found = stepwise2017_setup._thinned(some, online, 4)
+    chosen = PartialF(f_enter=100.0, f_delete=50.0).fit(some.frame().iloc[rows], some.deviations[rows, 0])
+    residual = some.deviations[rows, 0] - chosen.predict(some.frame().iloc[rows])
+    assert (found.rows, found.names) == (len(rows), chosen.terms_)
+    assert found.effective == pytest.approx(effective_sample_size(residual))
+    error = online.deviations[:, 0] - chosen.predict(online.frame())
+    assert found.rms == pytest.approx(np.sqrt(np.mean(error**2)))
 
 
 @pytest.mark.usefixtures("quick")
@@ -130,7 +141,20 @@ def test_the_online_test_is_another_recording(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(stepwise2017_setup, "record", made)
     monkeypatch.setattr(stepwise2017_setup, "THINNED", (1,))
-    c = stepwise2017_setup.compute(0, tell_nobody)
+    told: list[float] = []
+    c = stepwise2017_setup.compute(0, lambda share, _: told.append(share))
+    methods = [0.2 + 0.07 * k for k in range(len(stepwise2017_setup.METHODS))]
+    assert told == pytest.approx([0.0, 0.1, *methods, 0.8, 0.95])
+    # temperatures as they are, not their changes
+    raw, new = (
+        stack(
+            _of(e, 0, few=True), ["x1_um"], [i.name for i in c.fit.inputs if i.quantity == "temperature"], rezero=False
+        )
+        for e in ("stepwise2017", "stepwise2017-online")
+    )
+    absolute = PartialF(f_enter=100.0, f_delete=50.0).fit(raw.frame(), raw.deviations[:, 0])
+    left = new.deviations[:, 0] - absolute.predict(new.frame())
+    assert c.absolute == pytest.approx(np.sqrt(np.mean(left**2)))
     assert asked == ["stepwise2017", "stepwise2017-online"]
     for samples, name in zip((c.fit, c.online), asked, strict=True):
         (test,) = _of(name, 0, few=True)

@@ -320,11 +320,23 @@ def test_the_wider_series_is_the_one_with_peaks(
 ) -> None:
     both = [curved(199, top, seed=k) for k, top in enumerate(tops)]
     monkeypatch.setattr(wessel2004_spindle, "record", lambda *_, **__: both)
+    orders: list[tuple[str, ...]] = []
+
+    def asked(
+        recordings: Sequence[Recording], target: int, temperatures: Sequence[int], *, beside: bool = True
+    ) -> MillingTrial:
+        orders.append((*(r.name for r in recordings), str(beside)))
+        return trial(recordings, target, temperatures, beside=beside)
+
+    monkeypatch.setattr(wessel2004_spindle, "trial", asked)
     found = wessel2004_spindle.spindle(0, lambda *_: None)
     for words in ("are cropped", "support guard"):
         c = claim(found.claims, words)
         assert c.holds
         assert c.ours.startswith("the two series exchanged: ") == exchanged
+    # the other methods are fitted once, and the second time the other way round
+    names = tuple(r.name for r in both)
+    assert orders == [(*names, "True"), (*names[::-1], "False")][: 1 + exchanged]
 
 
 def test_runs_of_rows() -> None:

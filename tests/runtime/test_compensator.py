@@ -140,6 +140,23 @@ def test_limits_hold_for_any_number(
         assert new == current or abs(max(-magnitude, min(magnitude, target)) - current) > dead_band
 
 
+def test_limits_at_their_edges() -> None:
+    """C-38: a change of exactly the dead band is none; what the rate just allows is taken whole, either way."""
+    limits = Limits(magnitude=10.0, rate=0.5, dead_band=2.0)
+    for sign in (1.0, -1.0):
+        for target, current, dt, new in (
+            (2.0, 0.0, 60.0, 0.0),
+            (2.5, 0.0, 60.0, 2.5),
+            (5.0, 0.0, 10.0, 5.0),
+            (5.0, 0.0, 8.0, 4.0),
+            (5.0, 1.0, 4.0, 3.0),
+            (99.0, 0.0, 60.0, 10.0),
+            (8.0, 5.0, 0.0, 5.0),
+            (8.0, 5.0, 1.0, 5.5),
+        ):
+            assert limit_offset(sign * target, sign * current, dt, limits) == sign * new
+
+
 def test_rate_limit_is_reached_over_time() -> None:
     limits = Limits(magnitude=100.0, rate=0.1, reading_age=60.0)
     state = start([model()])

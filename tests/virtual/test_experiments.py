@@ -70,6 +70,10 @@ def test_slow_sampling_asks_the_machine_often_enough() -> None:
     test = done(programme(sampling=100.0, segments=(SteadySegment(200.0, FeedDrive(600.0)),)), machine)
     assert machine.steps == [180, 10]
     np.testing.assert_allclose(test.truth[:, 0], [0.0, 1.0, 2.0])
+    told = done(programme(sampling=100.0, segments=(SteadySegment(200.0, FeedDrive(600.0)),)), whole=True).observables
+    assert told is not None
+    warm = told / (1.0 + np.arange(len(FakeMachine.observables)))
+    np.testing.assert_allclose(warm, np.repeat([[0.0], [1.0], [2.0]], told.shape[1], axis=1), atol=1e-12)
 
 
 def test_blocks_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -106,15 +106,19 @@ def test_chen_protocol() -> None:
         assert rpm[0] == rpm[1] == 0.0
         assert np.count_nonzero(rpm) * 360.0 == 6 * HOUR
         assert np.count_nonzero(rpm[-100:]) == 0  # 10 h of cooling
+        assert (len(rpm), test.time[1]) == (162, 360.0)
         assert all(f"t_{place}_C" in names(test, "temperature") for place in CHEN_PLACES)
     constant, drawn = simulated("chen1996-new")
     assert np.count_nonzero(column(constant, "spindle_rpm") == 1250.0) * 360.0 == 6.5 * HOUR
-    assert drawn.time[-1] > 8 * HOUR
+    assert (constant.time[1], constant.time[-1]) == (360.0, 12.1 * HOUR)
+    assert column(constant, "spindle_rpm")[:3].tolist() == [0.0, 0.0, 1250.0]
+    assert (drawn.time[1], drawn.time[-1]) == (180.0, pytest.approx(9.05 * HOUR))
     rpm = column(drawn, "spindle_rpm")[2:].reshape(12, 15)
     assert (np.ptp(rpm[:, :10], axis=1) == 0.0).all()
     assert (rpm[:, :10] > 0).all()
     assert (rpm[:, 10:] == 0).all()
     assert len(set(rpm[:, 0])) > 4
+    assert {*rpm[:, 0]} <= {600.0 + 50.0 * k for k in range(41)}
 
 
 def test_stepwise_protocol() -> None:

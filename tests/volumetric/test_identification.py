@@ -16,6 +16,7 @@ from thermocomp.volumetric.models.identification import (
     THERMAL,
     Displacement,
     IdentifiedComponents,
+    effects_of_components,
     identify_components,
 )
 
@@ -150,3 +151,21 @@ def test_what_cannot_be_meant_is_refused() -> None:
             identify_components(MILL, readings, np.zeros(len(readings)), codes=codes)
     with pytest.raises(InputError, match="expected 15 finite displacements"):
         identify_components(MILL, nest(), np.full(15, np.nan))
+
+
+def test_it_is_least_squares() -> None:
+    """C-01: with plain numpy; a reading has 0.5 um unless stated."""
+    readings = [*ENOUGH, *nest("bed", "tool")]
+    values = np.random.default_rng(3).normal(size=(4, len(readings)))
+    found = identify_components(MILL, readings, values)
+    design = effects_of_components(MILL, readings)[:, [INDEX[code] for code in found.codes]]
+    weights = np.linalg.lstsq(design, values.T)[0].T
+    np.testing.assert_allclose(found.values, weights, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.residual, values - weights @ design.T, atol=1e-9)
+    np.testing.assert_allclose(found.standard_errors, 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design))))
+    # the effects are those of exact transforms; X is behind the bed, so it has none on the last ones
+    each = np.eye(len(COMPONENTS))
+    np.testing.assert_allclose(effects_of_components(MILL, ENOUGH), measured(ENOUGH, each).T, atol=1e-3)
+    seen = [c.code for c, e in zip(COMPONENTS, design.T[: len(found.codes)], strict=False) if e[len(ENOUGH) :].any()]
+    assert len(seen) > 0
+    assert not effects_of_components(MILL, nest("bed", "tool"))[:, INDEX["XOX"]].any()

@@ -165,10 +165,11 @@ class TermTable:
 
 
 def _multiplied(factors: Sequence[Node]) -> Node:
-    if len(factors) == 1:
-        return factors[0]
-    if all(f == factors[0] for f in factors):
-        return Power(factors[0], len(factors))
+    first, *others = factors
+    if not others:
+        return first
+    if all(f == first for f in others):
+        return Power(first, len(factors))
     return Product(tuple(factors))
 
 

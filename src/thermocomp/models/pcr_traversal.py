@@ -75,7 +75,8 @@ class TraversedComponents(ShrunkRegressor):
             sets = np.array(list(combinations(range(Z.shape[1]), size)))
             values, axes = np.linalg.eigh(products[sets[:, :, None], sets[:, None, :]])
             used = values > _ROUNDING * values.max()
-            along = np.einsum("sik,si->sk", axes, moments[sets]) * used / np.where(used, values, 1.0)
+            along = np.einsum("sik,si->sk", axes, moments[sets])
+            along = np.divide(along, values, out=np.zeros(values.shape), where=used)
             path = np.cumsum((axes * along[:, None, :])[:, :, ::-1], axis=2)  # with the first, the first two ...
             weights = np.zeros((len(sets), most, Z.shape[1]))
             for k in range(most):

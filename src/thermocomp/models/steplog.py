@@ -1,6 +1,7 @@
 """Common part of the stepwise regressions: selection, and log in the style of SYSTAT 5.0 (Chen 1996, Fig. 2)."""
 
 import math
+import re
 from abc import abstractmethod
 from collections.abc import Sequence
 from textwrap import fill
@@ -33,7 +34,7 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
         In addition to SYSTAT's columns, the text contains the partial F, the corresponding significance, the change of
         R2 (E-T3), the kind of R2 (E-C10) and the effective sample size (E-C12).
         """
-        wide = max((len(s.term) for s in self.log_), default=0)
+        wide = len(max((s.term for s in self.log_), key=len, default=""))
         lines = [f"STEPWISE REGRESSION WITH {self._rule_text()}", ""]
         lines += [
             f"STEP={s.number:3d}  {s.action.upper():<6}  {s.term:<{wide}}  R= {_three(s.r)}"
@@ -76,4 +77,4 @@ class StepwiseRegressor(StaticRegressor, TermRegressor):
 
 def _three(value: float) -> str:
     """Format a number like SYSTAT: three decimals, no zero before the decimal point."""
-    return f"{value:.3f}".replace("0.", ".", 1) if abs(value) < 1 else f"{value:.3f}"
+    return re.sub(r"^(-?)0", r"\1", f"{value:.3f}")

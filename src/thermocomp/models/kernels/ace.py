@@ -17,17 +17,16 @@ MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 @compiled
 def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> bool:
     """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; return False if there is none."""
-    order, groups = how[2], how[4]
+    order = how[2]
     n = len(start)
     for j in range(len(phi)):
-        if groups[j] > 1:
-            running_sums(start, phi[j], order[j], sums)
-            smooth(sums, how, j, phi[j])
-            if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
-                for i in range(n):
-                    total[order[j, i]] = phi[j, i]
-                return True
-            phi[j] = 0.0
+        running_sums(start, phi[j], order[j], sums)
+        smooth(sums, how, j, phi[j])
+        if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
+            for i in range(n):
+                total[order[j, i]] = phi[j, i]
+            return True
+        phi[j] = 0.0
     return False
 
 
@@ -98,12 +97,13 @@ def solve(
     errors : ndarray of shape (n_sweeps,)
         E[(theta - sum phi)^2] after each sweep.
     """
-    p, n = len(order) - 1, len(start)
+    n = len(start)
     how = (half, converged, order, bounds, groups)
-    theta, work = np.zeros(n), (np.empty(n), np.empty(n + 1), np.empty(n))
-    state, last = np.zeros((p + 1, n)), np.zeros((p + 1, n))  # all phi, and their sum in rank order of S
-    before = np.empty((p, n))
-    phi, total = state[:p], state[p]
+    theta, work = np.zeros(n), (np.empty(n), np.empty(bounds.shape[1]), np.empty(n))
+    state = np.zeros(order.shape)  # all phi, and their sum in rank order of S
+    last = np.zeros_like(state)
+    phi, total = state[:-1], state[-1]
+    before = np.empty_like(phi)
     errors = np.empty(max_sweeps)
     sweeps = age = 0
     moved = 0.0
@@ -130,7 +130,7 @@ def solve(
         if converged:
             age = 0 if sweeps == 1 or moved > previous else age + 1
             momentum = min(MOMENTUM, age / (age + 3.0))
-            for j in range(p + 1):
+            for j in range(len(state)):
                 for i in range(n):
                     new = state[j, i]
                     state[j, i] = new + momentum * (new - last[j, i])

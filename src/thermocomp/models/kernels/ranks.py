@@ -175,13 +175,12 @@ def _level(bounds: RankArray, groups: Any, out: FloatArray) -> None:
         return
     for g in range(groups):
         first, last = bounds[g], bounds[g + 1]
-        if last - first > 1:
-            tied = 0.0
-            for i in range(first, last):
-                tied += out[i]
-            tied /= last - first
-            for i in range(first, last):
-                out[i] = tied
+        tied = 0.0
+        for i in range(first, last):
+            tied += out[i]
+        tied /= last - first
+        for i in range(first, last):
+            out[i] = tied
 
 
 @compiled

@@ -26,7 +26,7 @@ def scaling_in(low: FloatArray, high: FloatArray) -> Affine:
     low, high : ndarray of shape (n_channels,)
     """
     still = constant(low, high)
-    gain = np.where(still, 0.0, (HIGH - LOW) / np.where(still, 1.0, high - low))
+    gain = np.divide(HIGH - LOW, high - low, out=np.zeros(len(low)), where=~still)
     return Affine(tuple(gain.tolist()), tuple(np.where(still, 0.5, LOW - gain * low).tolist()))
 
 

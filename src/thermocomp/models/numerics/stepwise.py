@@ -280,14 +280,14 @@ class _Tableau:
         left = np.einsum("ij,ij->j", rest, rest)[:-1]
         gain = (rest[:, -1] @ rest[:, :-1]) ** 2
         gain /= np.maximum(left, _TINY)
-        gain[left <= self._now] = -1.0
+        gain[left <= self._now] = -np.inf
         if barred:
-            gain[barred] = -1.0
-        most = gain.max(initial=-1.0)
-        if most < 0:
+            gain[barred] = -np.inf
+        most = gain.max(initial=-np.inf)
+        if not np.isfinite(most):
             return None
         # F increases with the gain, so the greatest gain has the greatest F
-        index = int(np.argmax(gain >= most * (1 - _SAME)))
+        index = int(np.argmax(np.minimum(gain, most * (1 - _SAME))))
         return index, _ratio(float(gain[index]), max(self.sse - float(gain[index]), 0.0), self.df - 1)
 
     def worst(self, held: set[int] | None) -> tuple[int, float] | None:

@@ -151,7 +151,7 @@ def representatives(tri: Triangle, groups: Groups) -> tuple[int, ...]:
         squares = np.einsum("ij,ij->j", basis, basis)
         slopes = np.divide(residual @ basis, squares, out=np.zeros(len(columns)), where=squares > 0)
         gains = slopes**2 * squares
-        best = int(np.argmax(gains >= gains.max() * (1 - SAME) - rounding))
+        best = int(np.argmax(np.minimum(gains, gains.max() * (1 - SAME) - rounding)))
         residual -= slopes[best] * basis[:, best]
         found.append(columns[best])
         open_groups.remove(home[columns[best]])

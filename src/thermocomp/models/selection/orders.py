@@ -56,7 +56,7 @@ def final_prediction_error(sse: float, n: int, d: int) -> float:
 
 
 def compute_orders(
-    tri: Triangle, n_inputs: int, ks: Sequence[int], ms: Sequence[int], largest_root: float = 1.0
+    tri: Triangle, n_inputs: int, ks: Sequence[int], ms: Sequence[int], largest_root: float
 ) -> tuple[Order, ...]:
     """Compute all orders from the triangular factor of the greatest one, on the same rows, so that they are comparable.
 

@@ -37,7 +37,8 @@ EQ5 = {
     "T2*(T6-T7)": 2.499,
 }
 #: hidden nodes of the chosen net (C-26) and number of trainings; alternatives and number of trainings of each
-HIDDEN, STARTS = 20, 5
+HIDDEN = 20
+STARTS = 5
 SWEEP, SWEEP_STARTS = (5, 10, 15, 25, 30), 3
 
 

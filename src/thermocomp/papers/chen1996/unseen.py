@@ -19,7 +19,8 @@ from thermocomp.papers.study import Figure, FloatArray, StudyTable
 from thermocomp.recordings.samples import Samples
 
 #: level of the noise [degC] and number of draws (C-33, E-C9)
-NOISE, DRAWS = 0.4, 20
+NOISE = 0.4
+DRAWS = 20
 #: tests of new observations (C-32)
 TESTS = ("1250 1/min", "random speed")
 NONE, MRA, NET, DYNAMIC = "no compensation", "MRA", "net", "dynamic (ours)"

@@ -80,8 +80,9 @@ def spindle(seed: int, progress: Progress, physics: Physics | None = None) -> Pa
     """Reproduce section III, the finite-element spindle (W-01 to W-07)."""
     progress(0.0, "finite-element spindle")
     recordings = record("wessel-fem", physics=physics, seed=seed)
-    target = len(recordings[0].displacements) - 1  # S4, at the front tip of the tool
-    temperatures = range(len(recordings[0].temperatures))
+    reference, _ = recordings
+    target = len(reference.displacements) - 1  # S4, at the front tip of the tool
+    temperatures = range(len(reference.temperatures))
     found = trial(recordings, target, temperatures)
     exchanged = not found.beyond.any()  # the wider series must be the estimated one
     peaked = trial(recordings[::-1], target, temperatures, beside=False) if exchanged else found

@@ -236,7 +236,7 @@ def _tool_figures(recordings: list[Recording], r: Resting) -> tuple[Figure, ...]
     chosen = r.selection.chosen
     return (
         exhibits.figure("wessel2004-fig5", *recorded(recordings[:1], chosen), set=name_set(chosen)),
-        exhibits.figure("wessel2004-fig6", *recorded(recordings[-1:], chosen)),
+        exhibits.figure("wessel2004-fig6", *recorded(recordings[1:], chosen)),
         exhibits.figure("wessel2004-fig7", *_estimated(r.own)),
         exhibits.figure("wessel2004-tool-loops", *loops(r.own.learned)),
     )
