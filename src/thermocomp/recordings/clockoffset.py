@@ -1,0 +1,379 @@
+"""Offset and drift between the clocks of two loggers, from what both record and from responses to the spindle."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+import numpy as np
+from scipy.stats import t as student
+
+from thermocomp.core import lagbank
+from thermocomp.core.arrays import FloatArray
+from thermocomp.core.machine import Channel
+from thermocomp.recordings.recording import Recording
+
+#: largest offset [s] and drift [s/s] searched
+FAR, FASTEST = 10_800.0, 300e-6
+#: an offset is clear if the half-width of its 90 % interval is at most this [s], or two sampling intervals
+CLEAR = 30.0
+#: time constants of the responses to the spindle [s]
+_LAGS = (30.0, 120.0, 400.0, 1200.0, 3600.0, 10800.0)
+#: half-width of the 90 % interval of the delay of a displacement or temperature behind the spindle, and of a
+#: displacement behind or before the temperatures [s]
+_DELAYED, _HEATED = 25.0, 600.0
+#: width of the rows in the coarse and in the fine search, and step of the shifts [s]
+_COARSE, _FINE = 60.0, 10.0
+_MOST = 6000
+#: number of parts of a recording whose agreement gives the interval
+_PARTS = 12
+#: half-width of the 90 % interval of an event between two rows, in sampling intervals
+_SAMPLED = 0.45
+#: smallest share of rows in which a channel must have a value
+_THERE = 0.8
+#: half-width of the 90 % interval of the difference in delay of two sensors in one place [s]
+_SENSORS = 10.0
+PHI = 1.0
+#: number of channels examined closely
+_CHANNELS = 1
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """How far the clock of one recording is ahead of that of another.
+
+    Parameters
+    ----------
+    offset : float
+        In the middle of the common hours [s]; positive: the second clock is ahead.
+    half : float
+        Half-width of the 90 % interval of `offset` [s].
+    drift, drift_half : float
+        Rate at which the second clock gains on the first, and half-width of its 90 % interval [s/s].
+    limit : float
+        Largest half-width with which the offset is clear [s].
+    evidence : str
+        Channels that tell it.
+    shared : tuple of str
+        Channel of the first and of the second recording that contain the same quantity; empty if none tells it.
+    middle : float
+        Time to which `offset` applies, in the clock of the first recording [s since its first row].
+    """
+
+    offset: float
+    half: float
+    drift: float
+    drift_half: float
+    limit: float
+    evidence: str
+    shared: tuple[str, ...] = ()
+    middle: float = 0.0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """90 % interval of `offset` [s]."""
+        return self.offset - self.half, self.offset + self.half
+
+    @property
+    def clear(self) -> bool:
+        """Whether the offset is known well enough to be applied without being asked for."""
+        return self.half <= self.limit
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Features recorded by one logger that explain channels recorded by the other.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n,)
+        Times of the features [s].
+    features : ndarray of shape (n, n_features)
+    clock : ndarray of shape (m,)
+        Times of the responses, by the clock of the other logger [s].
+    responses : ndarray of shape (m, n_responses)
+    doubt : float
+        Half-width of the 90 % interval of a shift that data cannot show: sampling, delay of heat [s].
+    phi : float
+        Correlation of a residual with the next, to begin with.
+    names, cause : tuple of str, str
+        Channels of the responses, and what explains them.
+    shared : tuple of str
+        The channel in both recordings, if it is the same quantity.
+    swapped : bool
+        The features come from the second recording.
+    """
+
+    time: FloatArray
+    features: FloatArray
+    clock: FloatArray
+    responses: FloatArray
+    doubt: float
+    phi: float
+    names: tuple[str, ...]
+    cause: str
+    shared: tuple[str, ...] = ()
+    swapped: bool = False
+
+    def binned(self, width: float, *only: int) -> "_Pair":
+        """Return the pair with the responses, or one of them, averaged over intervals of some width [s]."""
+        clock, responses = _binned(self.clock, self.responses[:, list(only)] if only else self.responses, width)
+        return replace(self, clock=clock, responses=responses)
+
+
+def find_offset(first: Recording, second: Recording) -> ClockOffset | None:
+    """Return how far the clock of the second recording is ahead; None if nothing tells it."""
+    lead = begin(first, second)
+    middle = (max(0.0, lead) + min(float(first.time[-1]), lead + float(second.time[-1]))) / 2
+    limit = max(CLEAR, 2 * max(first.sampling_interval, second.sampling_interval))
+    best: ClockOffset | None = None
+    for tier in (_shared, _spindle, _heat):
+        ranked = sorted(
+            ((gain, k, shift, pair) for pair in tier(first, second, lead) for gain, k, shift in _coarse(pair)),
+            key=lambda found: -found[0],
+        )
+        for _, k, shift, pair in ranked[:_CHANNELS]:
+            found = _fine(pair, k, shift, middle, limit)
+            if found is not None and (best is None or found.half < best.half):
+                best = found
+            if best is not None and best.clear:
+                return best
+    return best
+
+
+def agree(x: FloatArray, y: FloatArray, *, noise: bool = False) -> bool:
+    """Return whether two channels are of the same quantity in the same place: their values rise and fall together.
+
+    Parameters
+    ----------
+    noise : bool
+        A correlation below 0.99 is accepted only if the difference of the channels is noise, without memory.
+    """
+    both = np.isfinite(x) & np.isfinite(y)
+    x, y = x[both], y[both]
+    if len(x) < 3 or not (np.ptp(x) > 0 and np.ptp(y) > 0):
+        return bool(len(x) and np.allclose(x, y))
+    r, ratio = float(np.corrcoef(x, y)[0, 1]), float(x.std() / y.std())
+    rest = x - y - (x - y).mean()
+    lasting = noise and r < 0.99 and float(rest[1:] @ rest[:-1]) > 0.5 * float(rest @ rest)
+    return r > 0.9 and 0.8 < ratio < 1.25 and not lasting
+
+
+def begin(first: Recording, second: Recording) -> float:
+    """Return when the second recording begins, by the clocks of both [s]; 0 if one has no timestamps."""
+    if not (first.start and second.start):
+        return 0.0
+    a, b = datetime.fromisoformat(first.start), datetime.fromisoformat(second.start)
+    if (a.tzinfo is None) != (b.tzinfo is None):  # a clock without a zone is taken as one of the other's
+        a, b = a.replace(tzinfo=None), b.replace(tzinfo=None)
+    return (b - a).total_seconds()
+
+
+def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
+    """Yield channels of the same quantity that both recordings contain."""
+    names = [(c.name, c.name) for c in first.channels if any(c == o for o in second.channels)]
+    if first.speed is not None and second.speed is not None and first.speed.name != second.speed.name:
+        names.append((first.speed.name, second.speed.name))
+    for a, b in names:
+        time, x = _values(first, (a,))
+        clock, y = _values(second, (b,))
+        if min(len(x), len(y)) > _PARTS and np.ptp(x) > 0 and np.ptp(y) > 0:
+            # a new speed began between two rows of either
+            steps = first.channel(a).quantity == "spindle_speed"
+            doubt = _SAMPLED * (_step(time) + _step(clock)) if steps else _SENSORS
+            cause = "in both" if a == b else f"and {a}"
+            yield _Pair(time, x, lead + clock, y, doubt, 0.0, (b,), cause, (a, b))
+
+
+def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
+    """Yield temperatures and displacements of one recording with the spindle speed of the other."""
+    for cause, effect, swapped in ((first, second, False), (second, first, True)):
+        if cause.speed is None or effect.speed is not None:
+            continue
+        time, speed = _values(cause, (cause.speed.name,))
+        clock, responses, names = _responses(effect, effect.displacements + effect.temperatures)
+        if not (names and np.ptp(np.abs(speed)) > 0):
+            continue
+        turning = np.abs(speed) / np.abs(speed).max()
+        both = np.column_stack([turning, turning**2])
+        # a new speed began between two rows
+        steps = np.vstack([both[:1], (both[1:] + both[:-1]) / 2])
+        slow = lagbank.run(np.tile(steps, len(_LAGS)), np.diff(time, prepend=-np.inf), np.repeat(_LAGS, 2))
+        doubt = float(np.hypot(_DELAYED, _SAMPLED * (_step(time) + _step(clock))))
+        features = np.column_stack([both, slow])
+        when = (lead + time, clock) if swapped else (time, lead + clock)
+        about = f"after {cause.speed.name}"
+        yield _Pair(when[0], features, when[1], responses, doubt, PHI, names, about, swapped=swapped)
+
+
+def _heat(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
+    """Yield displacements of one recording with the temperatures of the other."""
+    for cause, effect, swapped in ((first, second, False), (second, first, True)):
+        clock, responses, names = _responses(effect, effect.displacements)
+        time, heat, heated = _responses(cause, cause.temperatures)
+        if names and heated and not effect.temperatures:
+            time, heat = _binned(time, heat, _COARSE)
+            when = (lead + time, clock) if swapped else (time, lead + clock)
+            about = "with the temperatures"
+            yield _Pair(when[0], heat, when[1], responses, _HEATED, PHI, names, about, swapped=swapped)
+
+
+def _responses(recording: Recording, channels: Sequence[Channel]) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """Return times, values and names of the channels with few missing values, in the rows where all have one."""
+    table = recording.table
+    names = tuple(c.name for c in channels if table[c.name].notna().mean() > _THERE and table[c.name].nunique() > 1)
+    time, values = _values(recording, names)
+    return (time, values, names) if len(time) > _PARTS else (time, values, ())
+
+
+def _values(recording: Recording, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Return the times and values of channels in the rows where none is missing."""
+    x = recording.table[list(names)].to_numpy(dtype=np.float64)
+    there = np.isfinite(x).all(axis=1)
+    return recording.time[there], x[there]
+
+
+def _step(time: FloatArray) -> float:
+    return float(np.median(np.diff(time)))
+
+
+def _binned(time: FloatArray, values: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+    """Return the means of rows over intervals of some width [s], at most `_MOST` of them."""
+    width = max(width, float(time[-1] - time[0]) / _MOST)
+    if _step(time) >= width:
+        return time, values
+    edges = np.flatnonzero(np.diff(np.floor((time - time[0]) / width), prepend=-1.0))
+    size = np.diff(edges, append=len(time))
+    return np.add.reduceat(time, edges) / size, np.add.reduceat(values, edges, axis=0) / size[:, None]
+
+
+def _costs(pair: _Pair, shift: float, phi: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return squared residuals, (n_parts, n_responses), number of rows per part, and correlation with the next row.
+
+    Residuals of the regression of the responses on the features `shift` earlier, both reduced by `phi` times the row
+    before (Cochrane and Orcutt): slow drifts of the environment otherwise pass for a response.
+    """
+    when = pair.clock - shift
+    k = np.clip(np.searchsorted(pair.time, when), 1, len(pair.time) - 1)
+    a, b = pair.time[k - 1], pair.time[k]
+    w = ((when - a) / (b - a))[:, None]
+    X, Y = pair.features[k - 1] * (1 - w) + pair.features[k] * w, pair.responses
+    good = (w[:, 0] >= 0) & (w[:, 0] <= 1) & (b - a <= 3 * _step(pair.time))
+    follows = good[1:] & good[:-1] & (np.diff(pair.clock) < 2.5 * _step(pair.clock))
+    part = (np.arange(len(when)) * _PARTS // len(when))[1:][follows]
+    n = np.bincount(part, minlength=_PARTS).astype(np.float64)
+    if n.sum() < 3 * X.shape[1] + 10:
+        return np.full((_PARTS, Y.shape[1]), np.nan), n, np.full(Y.shape[1], phi)
+    A, y = ((Z[1:] - phi * Z[:-1])[follows] for Z in (X, Y))
+    A, y = A - A.mean(axis=0), y - y.mean(axis=0)
+    scale = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+    size, turn = np.linalg.eigh((A / scale).T @ (A / scale))
+    kept = size > 1e-9 * size[-1]
+    beta = turn[:, kept] @ (turn[:, kept].T @ ((A.T @ y) / scale[:, None]) / size[kept, None]) / scale[:, None]
+    left = Y - X @ beta
+    before = left[:-1][follows] - left[:-1][follows].mean(axis=0)
+    correlation = (before * left[1:][follows]).sum(axis=0) / np.maximum((before**2).sum(axis=0), 1e-300)
+    cost = np.zeros((_PARTS, Y.shape[1]))
+    np.add.at(cost, part, (y - A @ beta) ** 2)
+    return cost, n, correlation
+
+
+def _curves(pair: _Pair, shifts: FloatArray, phi: float) -> FloatArray:
+    """Return the squared residuals for each shift, (n_shifts, n_parts, n_responses), as if all rows were there."""
+    found = [_costs(pair, s, phi) for s in shifts.tolist()]
+    cost, n = np.array([f[0] for f in found]), np.array([f[1] for f in found])
+    whole = n.sum(axis=1)
+    usual = cost.sum(axis=1, keepdims=True) / np.maximum(whole, 1)[:, None, None]
+    n = np.minimum(n, most := n.max(axis=0))
+    cost = cost + usual * (most - n)[..., None]
+    cost[whole < 0.5 * whole.max()] = np.nan
+    return cost
+
+
+def _coarse(pair: _Pair) -> list[tuple[float, int, float]]:
+    """Return gain, number and shift [s] of each response; empty if parts of the recording do not agree on the shift."""
+    rough = pair.binned(_COARSE)
+    shifts = np.arange(-FAR, FAR + 1, _COARSE)
+    cost = _curves(rough, shifts, pair.phi)
+    cost = cost[known := np.isfinite(cost).all(axis=(1, 2))]
+    shifts = shifts[known]
+    if len(shifts) < 2:
+        return []
+    total = np.log(np.maximum(cost.sum(axis=1), 1e-300))
+    best = int(total.sum(axis=1).argmin())
+    others = [int(np.log(np.maximum(cost.sum(axis=1) - c, 1e-300)).sum(axis=1).argmin()) for c in cost.swapaxes(0, 1)]
+    near = 2.5 * max(_COARSE, _step(rough.clock), _step(pair.time), pair.doubt)
+    if np.abs(shifts[others] - shifts[best]).max() > near or best in (0, len(shifts) - 1):
+        return []
+    sharp = np.minimum(total[max(best - 2, 0)], total[min(best + 2, len(total) - 1)]) - total[best]
+    return [(float(g), k, float(shifts[best])) for k, g in enumerate(len(rough.clock) * sharp)]
+
+
+def _fine(pair: _Pair, k: int, shift: float, middle: float, limit: float) -> ClockOffset | None:
+    """Return offset and drift near a shift, with intervals from leaving out each part in turn."""
+    one = pair.binned(_FINE, k)
+    clock, phi = one.clock, pair.phi
+    reach = 3 * max(_COARSE, _step(clock), _step(pair.time)) + FASTEST * float(clock[-1] - clock[0]) / 2
+    shifts = shift + np.linspace(-reach, reach, 81)
+    for _ in range(2):
+        rough = _curves(one, shifts[::4], phi).sum(axis=1)
+        if not np.isfinite(rough).all():
+            return None
+        phi = float(np.clip(_costs(one, float(shifts[::4][rough.argmin()]), phi)[2][0], 0.0, 0.999))
+    cost = _curves(one, shifts, phi)[..., 0].T
+    if not np.isfinite(cost).all():
+        return None
+    part = np.arange(len(clock)) * _PARTS // len(clock)
+    away = np.bincount(part, clock) / np.bincount(part) - (middle if pair.swapped else middle + shift)
+    drifts = np.linspace(-FASTEST, FASTEST, 61)
+    moved = np.array(
+        [[np.interp(shifts + d * a, shifts, c) for a, c in zip(away, cost, strict=True)] for d in drifts]
+    )  # (n_drifts, n_parts, n_shifts)
+    told = np.ptp(cost, axis=1)
+    wide = float(student.ppf(0.95, max(told.sum() ** 2 / max((told**2).sum(), 1e-300) - 1, 1)))
+    (offset, drift), (half, drift_half) = _jackknife(moved, shifts, drifts, wide)
+    drift_half = float(np.hypot(drift_half, pair.doubt / (clock[-1] - clock[0])))
+    if abs(drift) > 0.95 * FASTEST:
+        drift, drift_half = 0.0, FASTEST
+    if abs(drift) <= drift_half:  # not told
+        (offset, _), (half, _) = _jackknife(moved[len(drifts) // 2][None], shifts, drifts[:1], wide)
+    if pair.shared:
+        there = (clock - offset >= pair.time[0]) & (clock - offset <= pair.time[-1])
+        same = np.interp(clock[there] - offset, pair.time, pair.features[:, 0])
+        if not agree(same, one.responses[there, 0], noise=True):
+            return None
+    sign = -1.0 if pair.swapped else 1.0
+    return ClockOffset(
+        offset=sign * offset,
+        half=float(np.hypot(half, pair.doubt)),
+        drift=sign * drift,
+        drift_half=drift_half,
+        limit=limit,
+        evidence=f"{pair.names[k]} {pair.cause}",
+        shared=pair.shared,
+        middle=middle,
+    )
+
+
+def _jackknife(
+    cost: FloatArray, shifts: FloatArray, drifts: FloatArray, wide: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return shift and drift of the smallest cost, (n_drifts, n_parts, n_shifts), and the half-widths of both."""
+    total = cost.sum(axis=1)
+    without = np.array([_best(total - cost[:, k], shifts, drifts) for k in range(_PARTS)])
+    spread = wide * np.sqrt((_PARTS - 1) / _PARTS * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+    return _best(total, shifts, drifts), (float(spread[0]), float(spread[1]))
+
+
+def _best(cost: FloatArray, shifts: FloatArray, drifts: FloatArray) -> tuple[float, float]:
+    """Return shift and drift of the smallest cost, between the values of the grid, (n_drifts, n_shifts)."""
+    i, j = np.unravel_index(int(cost.argmin()), cost.shape)
+    return _vertex(cost[i], int(j), shifts), _vertex(cost[:, j], int(i), drifts)
+
+
+def _vertex(cost: FloatArray, k: int, at: FloatArray) -> float:
+    """Return the lowest point of the parabola through a point and its neighbours."""
+    if not 0 < k < len(at) - 1:
+        return float(at[k])
+    left, mid, right = cost[k - 1 : k + 2]
+    bend = left - 2 * mid + right
+    return float(at[k] + (0.5 * (left - right) / bend if bend > 0 else 0.0) * (at[1] - at[0]))
