@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
-from scipy.stats import t as student
 
 from thermocomp.core import lagbank
 from thermocomp.core.arrays import FloatArray
@@ -33,8 +32,10 @@ _THERE = 0.8
 #: half-width of the 90 % interval of the difference in delay of two sensors in one place [s]
 _SENSORS = 10.0
 PHI = 1.0
+#: 95 % quantile of the normal distribution, and its standard deviation relative to the median absolute deviation
+_NORMAL, _ROBUST = 1.645, 1.4826
 #: number of channels examined closely
-_CHANNELS = 1
+_CHANNELS = 3
 
 
 @dataclass(frozen=True)
@@ -127,16 +128,14 @@ def find_offset(first: Recording, second: Recording) -> ClockOffset | None:
     limit = max(CLEAR, 2 * max(first.sampling_interval, second.sampling_interval))
     best: ClockOffset | None = None
     for tier in (_shared, _spindle, _heat):
-        ranked = sorted(
-            ((gain, k, shift, pair) for pair in tier(first, second, lead) for gain, k, shift in _coarse(pair)),
-            key=lambda found: -found[0],
-        )
-        for _, k, shift, pair in ranked[:_CHANNELS]:
-            found = _fine(pair, k, shift, middle, limit)
+        for pair in tier(first, second, lead):
+            if (rough := _coarse(pair)) is None:
+                continue
+            found = _fine(pair, *rough, middle, limit)
             if found is not None and (best is None or found.half < best.half):
                 best = found
-            if best is not None and best.clear:
-                return best
+        if best is not None and best.clear:
+            break
     return best
 
 
@@ -197,7 +196,8 @@ def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair
         both = np.column_stack([turning, turning**2])
         # a new speed began between two rows
         steps = np.vstack([both[:1], (both[1:] + both[:-1]) / 2])
-        slow = lagbank.run(np.tile(steps, len(_LAGS)), np.diff(time, prepend=-np.inf), np.repeat(_LAGS, 2))
+        lags = [lag for lag in _LAGS if lag >= max(_step(time), _step(clock))]  # shorter ones are not seen
+        slow = lagbank.run(np.tile(steps, len(lags)), np.diff(time, prepend=-np.inf), np.repeat(lags, 2))
         doubt = float(np.hypot(_DELAYED, _SAMPLED * (_step(time) + _step(clock))))
         features = np.column_stack([both, slow])
         when = (lead + time, clock) if swapped else (time, lead + clock)
@@ -289,53 +289,48 @@ def _curves(pair: _Pair, shifts: FloatArray, phi: float) -> FloatArray:
     return cost
 
 
-def _coarse(pair: _Pair) -> list[tuple[float, int, float]]:
-    """Return gain, number and shift [s] of each response; empty if parts of the recording do not agree on the shift."""
+def _coarse(pair: _Pair) -> tuple[list[int], float] | None:
+    """Return the responses that tell the shift best, and the shift [s]; None if parts of the recording do not agree."""
     rough = pair.binned(_COARSE)
     shifts = np.arange(-FAR, FAR + 1, _COARSE)
     cost = _curves(rough, shifts, pair.phi)
     cost = cost[known := np.isfinite(cost).all(axis=(1, 2))]
     shifts = shifts[known]
     if len(shifts) < 2:
-        return []
+        return None
     total = np.log(np.maximum(cost.sum(axis=1), 1e-300))
     best = int(total.sum(axis=1).argmin())
     others = [int(np.log(np.maximum(cost.sum(axis=1) - c, 1e-300)).sum(axis=1).argmin()) for c in cost.swapaxes(0, 1)]
     near = 2.5 * max(_COARSE, _step(rough.clock), _step(pair.time), pair.doubt)
     if np.abs(shifts[others] - shifts[best]).max() > near or best in (0, len(shifts) - 1):
-        return []
-    sharp = np.minimum(total[max(best - 2, 0)], total[min(best + 2, len(total) - 1)]) - total[best]
-    return [(float(g), k, float(shifts[best])) for k, g in enumerate(len(rough.clock) * sharp)]
-
-
-def _fine(pair: _Pair, k: int, shift: float, middle: float, limit: float) -> ClockOffset | None:
-    """Return offset and drift near a shift, with intervals from leaving out each part in turn."""
-    one = pair.binned(_FINE, k)
-    clock, phi = one.clock, pair.phi
-    reach = 3 * max(_COARSE, _step(clock), _step(pair.time)) + FASTEST * float(clock[-1] - clock[0]) / 2
-    shifts = shift + np.linspace(-reach, reach, 81)
-    for _ in range(2):
-        rough = _curves(one, shifts[::4], phi).sum(axis=1)
-        if not np.isfinite(rough).all():
-            return None
-        phi = float(np.clip(_costs(one, float(shifts[::4][rough.argmin()]), phi)[2][0], 0.0, 0.999))
-    cost = _curves(one, shifts, phi)[..., 0].T
-    if not np.isfinite(cost).all():
         return None
+    sharp = np.minimum(total[max(best - 2, 0)], total[min(best + 2, len(total) - 1)]) - total[best]
+    return np.argsort(-sharp)[:_CHANNELS].tolist(), float(shifts[best])
+
+
+def _fine(pair: _Pair, chosen: Sequence[int], shift: float, middle: float, limit: float) -> ClockOffset | None:
+    """Return offset and drift near a shift, with intervals from their likelihood and from leaving out each part."""
+    one = pair.binned(_FINE, *chosen)
+    clock = one.clock
+    long = float(clock[-1] - clock[0])
+    reach = 3 * max(_COARSE, _step(clock), _step(pair.time)) + FASTEST * long / 2
+    shifts = shift + np.linspace(-reach, reach, 81)
+    cost = np.zeros((_PARTS, len(shifts)))
+    for k in range(len(chosen)):
+        found = _likelihood(replace(one, responses=one.responses[:, [k]]), shifts)
+        if not np.isfinite(found).all():
+            return None
+        cost += found
     part = np.arange(len(clock)) * _PARTS // len(clock)
     away = np.bincount(part, clock) / np.bincount(part) - (middle if pair.swapped else middle + shift)
     drifts = np.linspace(-FASTEST, FASTEST, 61)
     moved = np.array(
         [[np.interp(shifts + d * a, shifts, c) for a, c in zip(away, cost, strict=True)] for d in drifts]
     )  # (n_drifts, n_parts, n_shifts)
-    told = np.ptp(cost, axis=1)
-    wide = float(student.ppf(0.95, max(told.sum() ** 2 / max((told**2).sum(), 1e-300) - 1, 1)))
-    (offset, drift), (half, drift_half) = _jackknife(moved, shifts, drifts, wide)
-    drift_half = float(np.hypot(drift_half, pair.doubt / (clock[-1] - clock[0])))
-    if abs(drift) > 0.95 * FASTEST:
-        drift, drift_half = 0.0, FASTEST
+    (offset, drift), (half, drift_half) = _estimate(moved, shifts, drifts)
+    drift_half = float(np.hypot(drift_half, pair.doubt / long))
     if abs(drift) <= drift_half:  # not told
-        (offset, _), (half, _) = _jackknife(moved[len(drifts) // 2][None], shifts, drifts[:1], wide)
+        (offset, _), (half, _) = _estimate(moved[len(drifts) // 2][None], shifts, drifts[:1])
     if pair.shared:
         there = (clock - offset >= pair.time[0]) & (clock - offset <= pair.time[-1])
         same = np.interp(clock[there] - offset, pair.time, pair.features[:, 0])
@@ -348,32 +343,47 @@ def _fine(pair: _Pair, k: int, shift: float, middle: float, limit: float) -> Clo
         drift=sign * drift,
         drift_half=drift_half,
         limit=limit,
-        evidence=f"{pair.names[k]} {pair.cause}",
+        evidence=f"{', '.join(pair.names[k] for k in chosen)} {pair.cause}",
         shared=pair.shared,
         middle=middle,
     )
 
 
-def _jackknife(
-    cost: FloatArray, shifts: FloatArray, drifts: FloatArray, wide: float
+def _likelihood(one: _Pair, shifts: FloatArray) -> FloatArray:
+    """Return -2 log-likelihood of a response per part and shift, (n_parts, n_shifts), but for a constant."""
+    phi = one.phi
+    for _ in range(2):
+        rough = _curves(one, shifts[::4], phi).sum(axis=1)
+        if not np.isfinite(rough).all():
+            return np.full((_PARTS, len(shifts)), np.nan)
+        phi = float(np.clip(_costs(one, float(shifts[::4][rough.argmin()]), phi)[2][0], 0.0, 0.999))
+    cost = _curves(one, shifts, phi)[..., 0].T
+    return cost / max(float(cost.sum(axis=0).min()), 1e-12) * len(one.clock)
+
+
+def _estimate(
+    cost: FloatArray, shifts: FloatArray, drifts: FloatArray
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return shift and drift of the smallest cost, (n_drifts, n_parts, n_shifts), and the half-widths of both."""
+    """Return mean shift and drift by their likelihood, and the half-widths of their intervals.
+
+    Parameters
+    ----------
+    cost : ndarray of shape (n_drifts, n_parts, n_shifts)
+        -2 log-likelihood.
+    """
     total = cost.sum(axis=1)
-    without = np.array([_best(total - cost[:, k], shifts, drifts) for k in range(_PARTS)])
-    spread = wide * np.sqrt((_PARTS - 1) / _PARTS * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
-    return _best(total, shifts, drifts), (float(spread[0]), float(spread[1]))
+    mean, spread = _mean(total, shifts, drifts)
+    without = np.array([_mean(total - cost[:, k], shifts, drifts)[0] for k in range(_PARTS)])
+    # the robust spread of what remains without each part: a jackknife in which one odd part does not decide
+    left_out = _ROBUST * np.sqrt(_PARTS - 1) * np.median(np.abs(without - np.median(without, axis=0)), axis=0)
+    half = _NORMAL * np.hypot(left_out, spread)
+    return (float(mean[0]), float(mean[1])), (float(half[0]), float(half[1]))
 
 
-def _best(cost: FloatArray, shifts: FloatArray, drifts: FloatArray) -> tuple[float, float]:
-    """Return shift and drift of the smallest cost, between the values of the grid, (n_drifts, n_shifts)."""
-    i, j = np.unravel_index(int(cost.argmin()), cost.shape)
-    return _vertex(cost[i], int(j), shifts), _vertex(cost[:, j], int(i), drifts)
-
-
-def _vertex(cost: FloatArray, k: int, at: FloatArray) -> float:
-    """Return the lowest point of the parabola through a point and its neighbours."""
-    if not 0 < k < len(at) - 1:
-        return float(at[k])
-    left, mid, right = cost[k - 1 : k + 2]
-    bend = left - 2 * mid + right
-    return float(at[k] + (0.5 * (left - right) / bend if bend > 0 else 0.0) * (at[1] - at[0]))
+def _mean(cost: FloatArray, shifts: FloatArray, drifts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard deviation of shift and drift, weighted by their likelihood."""
+    weight = np.exp(-0.5 * (cost - cost.min()))
+    weight /= weight.sum()
+    along = np.array([(weight.sum(axis=0) @ shifts), (weight.sum(axis=1) @ drifts)])
+    square = np.array([weight.sum(axis=0) @ (shifts - along[0]) ** 2, weight.sum(axis=1) @ (drifts - along[1]) ** 2])
+    return along, np.sqrt(square)
