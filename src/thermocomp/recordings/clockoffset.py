@@ -31,7 +31,6 @@ _SAMPLED = 0.45
 _THERE = 0.8
 #: half-width of the 90 % interval of the difference in delay of two sensors in one place [s]
 _SENSORS = 10.0
-PHI = 1.0
 #: 95 % quantile of the normal distribution, and its standard deviation relative to the median absolute deviation
 _NORMAL, _ROBUST = 1.645, 1.4826
 #: number of channels examined closely
@@ -145,7 +144,8 @@ def agree(x: FloatArray, y: FloatArray, *, noise: bool = False) -> bool:
     Parameters
     ----------
     noise : bool
-        A correlation below 0.99 is accepted only if the difference of the channels is noise, without memory.
+        A correlation below 0.99 is accepted only if the difference of the channels is noise, without memory, or small
+        in most rows: at the steps of a spindle speed it is large.
     """
     both = np.isfinite(x) & np.isfinite(y)
     x, y = x[both], y[both]
@@ -153,7 +153,8 @@ def agree(x: FloatArray, y: FloatArray, *, noise: bool = False) -> bool:
         return bool(len(x) and np.allclose(x, y))
     r, ratio = float(np.corrcoef(x, y)[0, 1]), float(x.std() / y.std())
     rest = x - y - (x - y).mean()
-    lasting = noise and r < 0.99 and float(rest[1:] @ rest[:-1]) > 0.5 * float(rest @ rest)
+    small = np.median(np.abs(x - y - np.median(x - y))) < 0.05 * x.std()
+    lasting = noise and r < 0.99 and not small and float(rest[1:] @ rest[:-1]) > 0.5 * float(rest @ rest)
     return r > 0.9 and 0.8 < ratio < 1.25 and not lasting
 
 
@@ -169,7 +170,8 @@ def begin(first: Recording, second: Recording) -> float:
 
 def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
     """Yield channels of the same quantity that both recordings contain."""
-    names = [(c.name, c.name) for c in first.channels if any(c == o for o in second.channels)]
+    there = {(c.name, c.quantity) for c in second.channels}
+    names = [(c.name, c.name) for c in first.channels if (c.name, c.quantity) in there]
     if first.speed is not None and second.speed is not None and first.speed.name != second.speed.name:
         names.append((first.speed.name, second.speed.name))
     for a, b in names:
@@ -178,9 +180,18 @@ def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]
         if min(len(x), len(y)) > _PARTS and np.ptp(x) > 0 and np.ptp(y) > 0:
             # a new speed began between two rows of either
             steps = first.channel(a).quantity == "spindle_speed"
-            doubt = _SAMPLED * (_step(time) + _step(clock)) if steps else _SENSORS
-            cause = "in both" if a == b else f"and {a}"
-            yield _Pair(time, x, lead + clock, y, doubt, 0.0, (b,), cause, (a, b))
+            doubt = float(np.hypot(_SAMPLED * (_step(time) + _step(clock)), _FINE / 2)) if steps else _SENSORS
+            yield _Pair(
+                time=time,
+                features=x,
+                clock=lead + clock,
+                responses=y,
+                doubt=doubt,
+                phi=0.0,
+                names=(b,),
+                cause="in both" if a == b else f"and {a}",
+                shared=(a, b),
+            )
 
 
 def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
@@ -198,11 +209,17 @@ def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair
         steps = np.vstack([both[:1], (both[1:] + both[:-1]) / 2])
         lags = [lag for lag in _LAGS if lag >= max(_step(time), _step(clock))]  # shorter ones are not seen
         slow = lagbank.run(np.tile(steps, len(lags)), np.diff(time, prepend=-np.inf), np.repeat(lags, 2))
-        doubt = float(np.hypot(_DELAYED, _SAMPLED * (_step(time) + _step(clock))))
-        features = np.column_stack([both, slow])
-        when = (lead + time, clock) if swapped else (time, lead + clock)
-        about = f"after {cause.speed.name}"
-        yield _Pair(when[0], features, when[1], responses, doubt, PHI, names, about, swapped=swapped)
+        yield _Pair(
+            time=time + lead * swapped,
+            features=np.column_stack([both, slow]),
+            clock=clock + lead * (not swapped),
+            responses=responses,
+            doubt=float(np.hypot(_DELAYED, _SAMPLED * (_step(time) + _step(clock)))),
+            phi=1.0,
+            names=names,
+            cause=f"after {cause.speed.name}",
+            swapped=swapped,
+        )
 
 
 def _heat(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
@@ -212,9 +229,17 @@ def _heat(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
         time, heat, heated = _responses(cause, cause.temperatures)
         if names and heated and not effect.temperatures:
             time, heat = _binned(time, heat, _COARSE)
-            when = (lead + time, clock) if swapped else (time, lead + clock)
-            about = "with the temperatures"
-            yield _Pair(when[0], heat, when[1], responses, _HEATED, PHI, names, about, swapped=swapped)
+            yield _Pair(
+                time=time + lead * swapped,
+                features=heat,
+                clock=clock + lead * (not swapped),
+                responses=responses,
+                doubt=_HEATED,
+                phi=1.0,
+                names=names,
+                cause="with the temperatures",
+                swapped=swapped,
+            )
 
 
 def _responses(recording: Recording, channels: Sequence[Channel]) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
@@ -286,7 +311,7 @@ def _curves(pair: _Pair, shifts: FloatArray, phi: float) -> FloatArray:
     n = np.minimum(n, most := n.max(axis=0))
     cost = cost + usual * (most - n)[..., None]
     cost[whole < 0.5 * whole.max()] = np.nan
-    return cost
+    return np.asarray(cost)
 
 
 def _coarse(pair: _Pair) -> tuple[list[int], float] | None:
