@@ -29,6 +29,8 @@ _PARTS = 12
 _SAMPLED = 0.45
 #: smallest share of rows in which a channel must have a value
 _THERE = 0.8
+#: width of the means of a temperature that both loggers have, if five rows are not longer [s]
+_SMOOTHED = 300.0
 #: half-width of the 90 % interval of the difference in delay of two sensors in one place [s]
 _SENSORS = 10.0
 #: 95 % quantile of the normal distribution, and its standard deviation relative to the median absolute deviation
@@ -178,9 +180,11 @@ def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]
         time, x = _values(first, (a,))
         clock, y = _values(second, (b,))
         if min(len(x), len(y)) > _PARTS and np.ptp(x) > 0 and np.ptp(y) > 0:
-            # a new speed began between two rows of either
-            steps = first.channel(a).quantity == "spindle_speed"
-            doubt = float(np.hypot(_SAMPLED * (_step(time) + _step(clock)), _FINE / 2)) if steps else _SENSORS
+            doubt = _SAMPLED * (_step(time) + _step(clock))  # a new speed began between two rows of either
+            if first.channel(a).quantity != "spindle_speed":
+                width, doubt = max(_SMOOTHED, 5 * _step(time), 5 * _step(clock)), _SENSORS
+                time, x = _smoothed(time, x, width)
+                clock, y = _binned(clock, y, width)
             yield _Pair(
                 time=time,
                 features=x,
@@ -197,7 +201,7 @@ def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]
 def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
     """Yield temperatures and displacements of one recording with the spindle speed of the other."""
     for cause, effect, swapped in ((first, second, False), (second, first, True)):
-        if cause.speed is None or effect.speed is not None:
+        if cause.speed is None:
             continue
         time, speed = _values(cause, (cause.speed.name,))
         clock, responses, names = _responses(effect, effect.displacements + effect.temperatures)
@@ -269,6 +273,17 @@ def _binned(time: FloatArray, values: FloatArray, width: float) -> tuple[FloatAr
     edges = np.flatnonzero(np.diff(np.floor((time - time[0]) / width), prepend=-1.0))
     size = np.diff(edges, append=len(time))
     return np.add.reduceat(time, edges) / size, np.add.reduceat(values, edges, axis=0) / size[:, None]
+
+
+def _smoothed(time: FloatArray, values: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+    """Return moving means, 20 per width [s]: interpolated noise would be smallest midway between two rows."""
+    grid = np.arange(time[0] + width / 2, time[-1] - width / 2, width / 20)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:, 0] + values[:-1, 0]) * np.diff(time))])
+    ends = [grid - width / 2, grid + width / 2]
+    rows = np.searchsorted(time, ends[1]) - np.searchsorted(time, ends[0])
+    there = rows > 0.6 * width / _step(time)
+    means = (np.interp(ends[1], time, area) - np.interp(ends[0], time, area)) / width
+    return grid[there], means[there, None]
 
 
 def _costs(pair: _Pair, shift: float, phi: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -361,10 +376,10 @@ def _fine(pair: _Pair, chosen: Sequence[int], shift: float, middle: float, limit
         same = np.interp(clock[there] - offset, pair.time, pair.features[:, 0])
         if not agree(same, one.responses[there, 0], noise=True):
             return None
-    sign = -1.0 if pair.swapped else 1.0
+    sign, grid = -1.0 if pair.swapped else 1.0, float(shifts[1] - shifts[0])
     return ClockOffset(
         offset=sign * offset,
-        half=float(np.hypot(half, pair.doubt)),
+        half=float(np.hypot(np.hypot(half, pair.doubt), grid / 2)),
         drift=sign * drift,
         drift_half=drift_half,
         limit=limit,
