@@ -196,3 +196,12 @@ def test_complete_recordings_and_other_days_are_left_alone(table: pd.DataFrame) 
     later = logged(table, PROBES, 200_000)
     found = tc.check([both, logged(table, HEAT, 100_000), later])
     assert not [f for each in found.findings for f in each if f.kind == "loggers"]
+
+
+@pytest.mark.parametrize("rows", [2, 5, 59, 61, 130])
+@pytest.mark.parametrize("dt", [0.1, 1.0, 60.0])
+def test_a_short_recording_tells_nothing_wrong(table: pd.DataFrame, rows: int, dt: float) -> None:
+    short = table[:rows].assign(time_s=dt * np.arange(rows))
+    joined, told = join_two(logged(short, [*HEAT, SPEED]), logged(short, [*PROBES, SPEED, "t_air_C"]))
+    assert len(joined) == rows
+    assert told.applied == 0

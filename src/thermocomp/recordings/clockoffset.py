@@ -25,6 +25,8 @@ _COARSE, _FINE = 60.0, 10.0
 _MOST = 6000
 #: number of parts of a recording whose agreement gives the interval
 _PARTS = 12
+#: smallest number of rows, also of means over `_COARSE`
+_LEAST = 5 * _PARTS
 #: half-width of the 90 % interval of an event between two rows, in sampling intervals
 _SAMPLED = 0.45
 #: smallest share of rows in which a channel must have a value
@@ -128,11 +130,11 @@ def find_offset(first: Recording, second: Recording) -> ClockOffset | None:
     middle = (max(0.0, lead) + min(float(first.time[-1]), lead + float(second.time[-1]))) / 2
     limit = max(CLEAR, 2 * max(first.sampling_interval, second.sampling_interval))
     best: ClockOffset | None = None
-    for tier in (_shared, _spindle, _heat):
-        for pair in tier(first, second, lead):
-            if (rough := _coarse(pair)) is None:
-                continue
-            found = _fine(pair, *rough, middle, limit)
+    tiers = _shared(first, second, lead), *(_caused(first, second, lead, heat=heat) for heat in (False, True))
+    for tier in tiers:
+        for pair in tier:
+            rough = _coarse(pair)
+            found = None if rough is None else _fine(pair, *rough, middle, limit)
             if found is not None and (best is None or found.half < best.half):
                 best = found
         if best is not None and best.clear:
@@ -179,7 +181,7 @@ def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]
     for a, b in names:
         time, x = _values(first, (a,))
         clock, y = _values(second, (b,))
-        if min(len(x), len(y)) > _PARTS and np.ptp(x) > 0 and np.ptp(y) > 0:
+        if min(len(x), len(y)) >= _LEAST and np.ptp(x) > 0 and np.ptp(y) > 0:
             doubt = _SAMPLED * (_step(time) + _step(clock))  # a new speed began between two rows of either
             if first.channel(a).quantity != "spindle_speed":
                 width, doubt = max(_SMOOTHED, 5 * _step(time), 5 * _step(clock)), _SENSORS
@@ -198,52 +200,42 @@ def _shared(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]
             )
 
 
-def _spindle(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
-    """Yield temperatures and displacements of one recording with the spindle speed of the other."""
+def _caused(first: Recording, second: Recording, lead: float, *, heat: bool) -> Iterator[_Pair]:
+    """Yield what follows in one recording from the spindle speed in the other, or from its temperatures (`heat`)."""
     for cause, effect, swapped in ((first, second, False), (second, first, True)):
-        if cause.speed is None:
+        clock, responses, names = _responses(effect, effect.displacements + effect.temperatures * (not heat))
+        channels = cause.temperatures if heat else cause.of_quantity("spindle_speed")[:1]
+        time, features, causes = _responses(cause, channels)
+        if not (names and causes) or (heat and effect.temperatures):
             continue
-        time, speed = _values(cause, (cause.speed.name,))
-        clock, responses, names = _responses(effect, effect.displacements + effect.temperatures)
-        if not (names and np.ptp(np.abs(speed)) > 0):
-            continue
-        turning = np.abs(speed) / np.abs(speed).max()
-        both = np.column_stack([turning, turning**2])
-        # a new speed began between two rows
-        steps = np.vstack([both[:1], (both[1:] + both[:-1]) / 2])
-        lags = [lag for lag in _LAGS if lag >= max(_step(time), _step(clock))]  # shorter ones are not seen
-        slow = lagbank.run(np.tile(steps, len(lags)), np.diff(time, prepend=-np.inf), np.repeat(lags, 2))
+        doubt, why = _HEATED, "with the temperatures"
+        if heat:
+            time, features = _binned(time, features, _COARSE)
+        else:
+            steps, why = (_step(time), _step(clock)), f"after {causes[0]}"
+            doubt = float(np.hypot(_DELAYED, _SAMPLED * sum(steps)))
+            features = _felt(time, features, max(steps))
         yield _Pair(
             time=time + lead * swapped,
-            features=np.column_stack([both, slow]),
+            features=features,
             clock=clock + lead * (not swapped),
             responses=responses,
-            doubt=float(np.hypot(_DELAYED, _SAMPLED * (_step(time) + _step(clock)))),
+            doubt=doubt,
             phi=1.0,
             names=names,
-            cause=f"after {cause.speed.name}",
+            cause=why,
             swapped=swapped,
         )
 
 
-def _heat(first: Recording, second: Recording, lead: float) -> Iterator[_Pair]:
-    """Yield displacements of one recording with the temperatures of the other."""
-    for cause, effect, swapped in ((first, second, False), (second, first, True)):
-        clock, responses, names = _responses(effect, effect.displacements)
-        time, heat, heated = _responses(cause, cause.temperatures)
-        if names and heated and not effect.temperatures:
-            time, heat = _binned(time, heat, _COARSE)
-            yield _Pair(
-                time=time + lead * swapped,
-                features=heat,
-                clock=clock + lead * (not swapped),
-                responses=responses,
-                doubt=_HEATED,
-                phi=1.0,
-                names=names,
-                cause="with the temperatures",
-                swapped=swapped,
-            )
+def _felt(time: FloatArray, speed: FloatArray, step: float) -> FloatArray:
+    """Return what may follow from the spindle speed, (n_rows, n_features): speed and its square, and lags of both."""
+    turning = np.abs(speed) / np.abs(speed).max()
+    both = np.column_stack([turning, turning**2])
+    between = np.vstack([both[:1], (both[1:] + both[:-1]) / 2])  # a new speed began between two rows
+    lags = [lag for lag in _LAGS if lag >= step]  # shorter ones are not seen
+    slow = lagbank.run(np.tile(between, len(lags)), np.diff(time, prepend=-np.inf), np.repeat(lags, 2))
+    return np.column_stack([both, slow])
 
 
 def _responses(recording: Recording, channels: Sequence[Channel]) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
@@ -251,7 +243,7 @@ def _responses(recording: Recording, channels: Sequence[Channel]) -> tuple[Float
     table = recording.table
     names = tuple(c.name for c in channels if table[c.name].notna().mean() > _THERE and table[c.name].nunique() > 1)
     time, values = _values(recording, names)
-    return (time, values, names) if len(time) > _PARTS else (time, values, ())
+    return (time, values, names) if len(time) >= _LEAST else (time, values, ())
 
 
 def _values(recording: Recording, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
@@ -277,7 +269,7 @@ def _binned(time: FloatArray, values: FloatArray, width: float) -> tuple[FloatAr
 
 def _smoothed(time: FloatArray, values: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
     """Return moving means, 20 per width [s]: interpolated noise would be smallest midway between two rows."""
-    grid = np.arange(time[0] + width / 2, time[-1] - width / 2, width / 20)
+    grid = np.arange(time[0] + width / 2, time[-1] - width / 2, width / 20)  # empty if it is too short
     area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:, 0] + values[:-1, 0]) * np.diff(time))])
     ends = [grid - width / 2, grid + width / 2]
     rows = np.searchsorted(time, ends[1]) - np.searchsorted(time, ends[0])
@@ -331,7 +323,8 @@ def _curves(pair: _Pair, shifts: FloatArray, phi: float) -> FloatArray:
 
 def _coarse(pair: _Pair) -> tuple[list[int], float] | None:
     """Return the responses that tell the shift best, and the shift [s]; None if parts of the recording do not agree."""
-    rough = pair.binned(_COARSE)
+    if min(len(pair.time), len(pair.clock)) < _LEAST or len((rough := pair.binned(_COARSE)).clock) < _LEAST:
+        return None
     shifts = np.arange(-FAR, FAR + 1, _COARSE)
     cost = _curves(rough, shifts, pair.phi)
     cost = cost[known := np.isfinite(cost).all(axis=(1, 2))]
@@ -401,9 +394,7 @@ def _likelihood(one: _Pair, shifts: FloatArray) -> FloatArray:
     return cost / max(float(cost.sum(axis=0).min()), 1e-12) * len(one.clock)
 
 
-def _estimate(
-    cost: FloatArray, shifts: FloatArray, drifts: FloatArray
-) -> tuple[tuple[float, float], tuple[float, float]]:
+def _estimate(cost: FloatArray, shifts: FloatArray, drifts: FloatArray) -> list[list[float]]:
     """Return mean shift and drift by their likelihood, and the half-widths of their intervals.
 
     Parameters
@@ -416,8 +407,7 @@ def _estimate(
     without = np.array([_mean(total - cost[:, k], shifts, drifts)[0] for k in range(_PARTS)])
     # the robust spread of what remains without each part: a jackknife in which one odd part does not decide
     left_out = _ROBUST * np.sqrt(_PARTS - 1) * np.median(np.abs(without - np.median(without, axis=0)), axis=0)
-    half = _NORMAL * np.hypot(left_out, spread)
-    return (float(mean[0]), float(mean[1])), (float(half[0]), float(half[1]))
+    return [mean.tolist(), (_NORMAL * np.hypot(left_out, spread)).tolist()]
 
 
 def _mean(cost: FloatArray, shifts: FloatArray, drifts: FloatArray) -> tuple[FloatArray, FloatArray]:
