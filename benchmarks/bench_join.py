@@ -126,7 +126,8 @@ def judged(
     begin = (datetime.fromisoformat(first.start) - BEGIN).total_seconds()
     truth = wrong.origin + drifted.origin * (begin + (e.middle if e is not None else 0.0))
     off = abs(e.offset - truth) if e is not None else np.nan
-    ratio = error(joined) / error(join_two(first, right, 0.0)[0]) if models and told.applied else np.nan
+    judged_too = models and told.applied and len(joined.cycles) > 1
+    ratio = error(joined) / error(join_two(first, right, 0.0)[0]) if judged_too else np.nan
     return {
         "case": case,
         "test": f"{test}-{physics}-{seed}",
