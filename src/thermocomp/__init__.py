@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from thermocomp.api.check import check
     from thermocomp.api.explain import explain
     from thermocomp.api.inputs import read, training_table
+    from thermocomp.api.join import join
     from thermocomp.api.plan import may_stop, plan
     from thermocomp.api.select import select
     from thermocomp.api.verbs import assess, compare, fit
@@ -62,6 +63,7 @@ _PUBLIC = {
     "read": "thermocomp.api.inputs",
     "simulate": "thermocomp.virtual.verbs",
     "check": "thermocomp.api.check",
+    "join": "thermocomp.api.join",
     "select": "thermocomp.api.select",
     "compare": "thermocomp.api.verbs",
     "fit": "thermocomp.api.verbs",
@@ -158,6 +160,7 @@ __all__ = [
     "fit",
     "freeze",
     "iso230",
+    "join",
     "may_stop",
     "plan",
     "position",

@@ -133,6 +133,7 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
 def test_recordings(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert held("check", capsys, drift, "-o", "page.html")["page"] == "page.html"
     assert held("simulate", capsys, "demo", "-o", "demo.parquet")["recordings"]
+    assert held("join", capsys, drift, drift, "--offset", "30", "-o", "joined.csv")["clocks"][0]["given"]
     assert held("simulate", capsys, "--list")["experiments"]
 
 

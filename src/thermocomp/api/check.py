@@ -13,6 +13,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import SEVERITIES, Finding
 from thermocomp.recordings.checks.offsets import compare_starts
+from thermocomp.recordings.joining import suggest_join
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.recording import Recording
 
@@ -110,5 +111,6 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
     (2, False)
     """
     tests = recordings_of(recordings, mapping)
-    found = ((*quality.check(test), *off) for test, off in zip(tests, compare_starts(tests), strict=True))
+    apart = [Finding("warning", "", "loggers", text)] if (text := suggest_join(tests)) else []
+    found = ((*quality.check(t), *off, *apart) for t, off in zip(tests, compare_starts(tests), strict=True))
     return CheckedRecordings(tuple(tests), tuple(sorted(f, key=lambda f: SEVERITIES.index(f.severity)) for f in found))

@@ -17,6 +17,7 @@ from thermocomp.judging.splits import Judging
 from thermocomp.recordings.checks.offsets import compare_starts
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.checks.sound import drop_unsound
+from thermocomp.recordings.joining import suggest_join
 from thermocomp.recordings.readers import mapping as mappings
 from thermocomp.recordings.readers.mending import read_or_offer
 from thermocomp.recordings.recording import Recording
@@ -206,6 +207,8 @@ def prepare(
     """
     if jobs == 0:
         raise InputError("jobs 0: give a number of processes, or -1 for all cores")
+    if command := suggest_join(tests):
+        raise InputError(command)
     named = [targets] if isinstance(targets, str) else targets
     if named is None:
         named = [c.name for c in tests[0].displacements]

@@ -38,6 +38,8 @@ class Provenance:
         Fingerprints of the training rows, used to recognise them in another file.
     starts : tuple of str
         Initial state of each recording: cold, continued, rezeroed or known; in the order of `data_sha256`.
+    clocks : tuple of str
+        How the clocks of several loggers were brought together, for each recording made by ``thermocomp join``.
     """
 
     method: str
@@ -50,6 +52,7 @@ class Provenance:
     learned: Learned | None = None
     prints: Prints | None = field(default=None, repr=False)
     starts: tuple[str, ...] = ()
+    clocks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_between("provenance", 0, COEFFICIENT, rows=self.rows)

@@ -225,4 +225,5 @@ def _provenance(how: Method, estimator: ThermalRegressor, samples: Samples, targ
         version=__version__,
         learned=samples.learned(target, seen),
         starts=tuple(samples.starts[t].word for t in tests) if samples.starts else (),
+        clocks=tuple(samples.clocks[t] for t in tests if samples.clocks[t:] and samples.clocks[t]),
     )

@@ -56,6 +56,8 @@ class Recording:
     time_unit : str
         Unit that the source file states for its times, ``timestamp`` for dates and times of day; empty if a mapping
         states it.
+    clocks : str
+        How the clocks of several loggers were brought together, as text; empty for a single logger.
 
     Examples
     --------
@@ -83,6 +85,7 @@ class Recording:
     changed: tuple[str, ...] = ()
     compensation: str = ""
     time_unit: str = "s"
+    clocks: str = ""
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.table):

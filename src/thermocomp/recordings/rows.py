@@ -53,6 +53,8 @@ class Rows:
         Whether a correction was in force, see `Recording`.
     time_unit : str
         Unit that the file states for its times, see `Recording`.
+    clocks : str
+        How the clocks of several loggers were brought together, see `Recording`.
     """
 
     source: str
@@ -72,6 +74,7 @@ class Rows:
     changed: tuple[str, ...] = ()
     compensation: str = ""
     time_unit: str = "s"
+    clocks: str = ""
 
     def kept(self, rows: IntArray) -> "Rows":
         """Return only the rows with the given indices."""

@@ -54,6 +54,8 @@ class Samples:
         Initial state of each test; empty: cold.
     stamps : tuple of str
         ISO timestamp of the first row of each test, or of an earlier file it continues; empty: unknown.
+    clocks : tuple of str
+        How the clocks of the loggers of each test were brought together, see `Recording`; empty: nothing is known.
     trouble : tuple of (str, str)
         Channel (empty: the whole recording) and its persistent fault; see `thermocomp.recordings.checks.sound`.
     """
@@ -75,6 +77,7 @@ class Samples:
     resting: BoolArray | None = None
     starts: tuple[Start, ...] = ()
     stamps: tuple[str, ...] = ()
+    clocks: tuple[str, ...] = ()
     trouble: tuple[tuple[str, str], ...] = ()
 
     def __len__(self) -> int:

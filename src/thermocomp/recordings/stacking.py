@@ -85,6 +85,7 @@ def stack(
         zeroing=zeroing,
         resting=np.concatenate([p.resting for p in parts]),
         starts=tuple(p.start for p in parts),
+        clocks=tuple(r.clocks for r in recordings),
         stamps=tuple((*p.start.earlier, r)[0].start for p, r in zip(parts, recordings, strict=True)),
     )
 

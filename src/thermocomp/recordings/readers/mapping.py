@@ -181,6 +181,8 @@ class Mapping:
     compensation : {'', 'off', 'known', 'unknown'}
         ``off``: no correction was in force at the machine; ``known``: one was, and is recorded; ``unknown``: one may
         have been; empty: not specified. See `thermocomp.recordings.compensated`.
+    clocks : str
+        Written by ``thermocomp join``: how the clocks of the loggers were brought together.
     """
 
     time: TimeColumn = TimeColumn()
@@ -190,6 +192,7 @@ class Mapping:
     clean: tuple[CleaningStep, ...] = ()
     limits: FileLimits = FileLimits()
     compensation: Literal["", "off", "known", "unknown"] = ""
+    clocks: str = ""
 
     def __post_init__(self) -> None:
         if self.time.unit not in ("", "timestamp"):
@@ -211,12 +214,13 @@ class Mapping:
         _check_encoding(self.read.encoding or "utf-8")
 
     def over(self, below: "Mapping") -> "Mapping":
-        """Return this mapping, completed by the entries for time, compensation and columns that only `below` has."""
+        """Return this mapping, completed by the entries that only `below` has (not read, cycles, clean, limits)."""
         time = below.time if self.time == TimeColumn() else self.time
         taken = {rule.column or name for name, rule in self.columns.items()}
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
         said = self.compensation or below.compensation
-        return replace(self, time=time, columns={**added, **self.columns}, compensation=said)
+        columns, clocks = {**added, **self.columns}, self.clocks or below.clocks
+        return replace(self, time=time, columns=columns, compensation=said, clocks=clocks)
 
 
 #: only validator of external mappings; also used for the mapping that thermocomp writes into its own files

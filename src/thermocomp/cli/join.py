@@ -1,0 +1,47 @@
+"""`thermocomp join`: one recording of those of several loggers."""
+
+from pathlib import Path
+
+from thermocomp.api.join import JoinedRecordings
+from thermocomp.cli.face import CommandFace, command
+from thermocomp.cli.terminal import console, words
+
+
+def files_of(output: Path, _given: object) -> list[Path]:
+    """Return the path of the joined recording."""
+    return [output]
+
+
+@command("thermocomp.api.join:join", writes=files_of, needs_output=True, forms={"offset": list[float] | None})
+def join(found: JoinedRecordings, face: CommandFace) -> int:
+    """Write the recording, and show how the clocks were brought together.
+
+    Parameters
+    ----------
+    output : Path
+        Output file (.parquet or .csv).
+
+    Returns
+    -------
+    int
+        0 done, 2 unusable input.
+    """
+    face.write(found.save)
+    face.show(lambda: {**found.to_dict(), "file": str(face.output)}, lambda: _show(found, face.output))
+    return 0
+
+
+def _show(found: JoinedRecordings, path: Path | None) -> None:
+    for a in found.alignments:
+        console.print(words(a), soft_wrap=True)
+        for note in a.notes:
+            console.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
+    r = found.recording
+    missing = int(r.table.isna().any(axis=1).sum())
+    console.print(
+        f"{words(path)}: {len(r)} rows, {r.time[-1] / 3600:.1f} h, {len(r.temperatures)} temperatures, "
+        f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
+        + (f"; {missing} rows lack a value" if missing else ""),
+        soft_wrap=True,
+    )
+    console.print(f"Next: thermocomp check {words(path)}", soft_wrap=True)
