@@ -51,7 +51,7 @@ def test_what_is_shown_is_what_is_in_force() -> None:
             fed(service, 20.0, 21.5)
             state = (await client.get("/api/state")).json()
             (target,) = state["targets"]
-            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "not sent", -3.0)
+            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "no sink", -3.0)
             assert target["deviation_um"] == 3.0
             assert state["sensors"][0] | {"age_s": 0} == {
                 "name": "t",
