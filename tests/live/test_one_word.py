@@ -258,7 +258,7 @@ def test_refused_messages_are_an_alarm_and_end_active(broker: Mosquitto, bad: di
 
 def fed(own: Service, values: list[float]) -> list[str]:
     """Feed temperatures; return the states."""
-    found = []
+    found = list[str]()
     for value in values:
         own.take(Reading(time.time(), {"t": value}))
         found.append(own.find_status("z_um")[0].word)

@@ -113,14 +113,15 @@ class ConfirmedCorrections:
         """
         there, order = self.at_controller(target, outlets), state.orders.get(target)
         status = said.states.get(target) if said else order
-        if order is not None and order.word in UNKNOWN:
-            status, there = order, AtController("not sent", order.reason)
+        if order is not None and order.word in (*UNKNOWN, NO_ZERO):
+            status = order
+            there = there if order.word == NO_ZERO else AtController("not sent", order.reason)
         status = status or Status("restarting", "waits for its first reading")
         if status.word in (*UNKNOWN, NO_ZERO) and status != AVERAGED:
             way = self.way(target, "rezero" if status.word == NO_ZERO else "start")
             return status._replace(reason=f"{status.reason}{way}"), there
-        out = there.word == "no sink" and status.word != "shadow"  # whatever else is the matter
-        if there.word != "confirmed" and (out or status.word == "active"):
+        starts = there.word == "no sink" and status.word == "restarting"  # in vain
+        if there.word != "confirmed" and (starts or status.word == "active"):
             status = Status(there.word, there.reason)
         return status, there
 
