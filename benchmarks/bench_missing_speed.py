@@ -42,7 +42,9 @@ def main() -> None:
             (test,) = tc.simulate(name, seed=seed)
             machine = Machine.of(model, test)
             for missing in (False, True):
-                print(f"  {name} {seed}, {'missing' if missing else 'sound'}: {run(machine, missing=missing)}", flush=True)
+                print(
+                    f"  {name} {seed}, {'missing' if missing else 'sound'}: {run(machine, missing=missing)}", flush=True
+                )
 
 
 if __name__ == "__main__":
