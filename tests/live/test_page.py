@@ -47,11 +47,11 @@ def test_what_is_shown_is_what_is_in_force() -> None:
     async def work() -> None:
         async with asking(app) as client:
             state = (await client.get("/api/state")).json()
-            assert state["targets"][0]["reason"] == "waits for its first reading"
+            assert state["targets"][0]["reason"].startswith("no sink carries z_um")
             fed(service, 20.0, 21.5)
             state = (await client.get("/api/state")).json()
             (target,) = state["targets"]
-            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "not sent", -3.0)
+            assert (target["name"], target["state"], target["correction_um"]) == ("z_um", "no sink", -3.0)
             assert target["deviation_um"] == 3.0
             assert state["sensors"][0] | {"age_s": 0} == {
                 "name": "t",

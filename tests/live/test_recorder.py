@@ -64,7 +64,7 @@ def test_what_is_measured_under_a_correction_becomes_the_deviation(tmp_path: Pat
     assert [bool(u.refused) for u in updates] == [False, True, False]  # type: ignore[union-attr]
     assert (updates[0].measured, updates[0].before) == (pytest.approx(9.0), pytest.approx(8.0))  # type: ignore[union-attr]
     assert [r.why for r in rows if type(r).__name__ == "ReferenceRow"][-1] == "homing"  # type: ignore[union-attr]
-    assert [r.word for r in rows if type(r).__name__ == "StateRow"] == ["active", "holding"]  # type: ignore[union-attr]
+    assert [r.word for r in rows if type(r).__name__ == "StateRow"] == ["sent, not confirmed", "holding"]  # type: ignore[union-attr]
     exported = export(reader)
     assert exported.recording.table["t9_C"].dropna().tolist()[-1] == 19.5
     assert "t10_C" not in exported.recording.table

@@ -9,7 +9,7 @@ from thermocomp.core.shown import escape
 #: number of events kept for display, and maximum length of an event [characters]
 EVENTS, LONGEST = 200, 1_000
 #: kinds whose number is limited, and maximum number of one kind shown per minute
-LIMITED, MOST = ("link", "probing"), 30
+LIMITED, MOST = ("link", "probing", "state"), 30
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 from thermocomp.core.correction import Correction
@@ -11,7 +11,8 @@ from thermocomp.live.clock import ServiceClock
 from thermocomp.live.links import Outlet
 from thermocomp.live.recorder import CONFIRM_WITHIN
 from thermocomp.runtime.lines import DeviationLine
-from thermocomp.runtime.state import NO_ZERO, CompensatorState, Status
+from thermocomp.runtime.orders import AVERAGED
+from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status, Unconfirmed
 
 #: difference from the corrections sent lately above which another one is in force [um]
 ASIDE = 1.0
@@ -22,7 +23,7 @@ ACTIVE_WITHIN = 4.0
 class AtController(NamedTuple):
     """What is known of a correction at the controller."""
 
-    word: Literal["confirmed", "sent, not confirmed", "not confirmed", "not sent"]
+    word: Literal["confirmed"] | Unconfirmed
     reason: str = ""
     correction: Correction | None = None  #: as confirmed
     age: float | None = None  #: real time since the confirmation [s]
@@ -37,6 +38,8 @@ class ConfirmedCorrections:
         self._sure, self._clock, self._lines = controllers or list(sinks), clock, lines
         self._alarms = dict[str, str]()
         self._demanded = deque[tuple[float, Mapping[str, Correction]]](maxlen=1000)
+        #: how a person orders 'start' or 'rezero' for a target, as text
+        self.way: Callable[[str, str], str] = lambda _target, _order: ""
         #: correction and time of its confirmation, by target [um, s]
         self.confirmed = dict[str, tuple[Correction, float]]()
 
@@ -76,7 +79,9 @@ class ConfirmedCorrections:
         """Return what is known of the correction of a target at the controllers and other sinks that receive it."""
         mine = [one for one in outlets if one.receives(target)]
         if not mine:
-            return AtController("not sent", "no sink receives this correction")
+            axes = next((a for o in outlets if (a := getattr(o.sink, "axes", None))), None)
+            more = f'add it to axes of the LinuxCNC sink, {target} = "..." for its axis, or add' if axes else "add"
+            return AtController("no sink", f"no sink carries {target}: {more} a table [[sinks]] to the configuration")
         for one in mine:
             link = one.status()
             lost = link.state != "connected" and (link.reason or link.state)
@@ -95,6 +100,30 @@ class ConfirmedCorrections:
         if alarm := self._alarms.get(target, "") if own else self._differs(target, found):
             return AtController("not confirmed", alarm, found, age)
         return AtController("confirmed", "", found, age)
+
+    def find_status(
+        self, target: str, said: Compensated | None, state: CompensatorState, outlets: Sequence[Outlet]
+    ) -> tuple[Status, AtController]:
+        """Return the status of a target as it is reported everywhere, and what is known at the controllers.
+
+        Parameters
+        ----------
+        said : Compensated or None
+            Latest output of the compensator.
+        """
+        there, order = self.at_controller(target, outlets), state.orders.get(target)
+        status = said.states.get(target) if said else order
+        if order is not None and order.word in (*UNKNOWN, NO_ZERO):
+            status = order
+            there = there if order.word == NO_ZERO else AtController("not sent", order.reason)
+        status = status or Status("restarting", "waits for its first reading")
+        if status.word in (*UNKNOWN, NO_ZERO) and status != AVERAGED:
+            way = self.way(target, "rezero" if status.word == NO_ZERO else "start")
+            return status._replace(reason=f"{status.reason}{way}"), there
+        starts = there.word == "no sink" and status.word == "restarting"  # in vain
+        if there.word != "confirmed" and (starts or status.word == "active"):
+            status = Status(there.word, there.reason)
+        return status, there
 
     def new_alarms(self, sink: Suspending) -> Iterator[str]:
         """Yield changes of alarms: a correction in force that differs from the commanded one, or no longer does."""

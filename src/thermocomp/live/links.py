@@ -35,6 +35,7 @@ class Link:
         self.end = end
         self.trouble = ""  #: reason of the last loss, until connected again
         self._wait, self._told, self._refused = FIRST, "", (0, -SELDOM)
+        self._last_refused = 0, -SELDOM
         self._losses = deque[str](maxlen=2)  # losses still to be reported: one may be shorter than the polling interval
 
     ended = False  #: a source has been played to its end
@@ -85,6 +86,12 @@ class Link:
         """Kind of source or sink: the attribute ``label`` of its class, or the name of the class."""
         return str(getattr(self.end, "label", type(self.end).__name__))
 
+    @property
+    def refusing(self) -> str:
+        """Reason why messages of the last minute were refused; empty if none was."""
+        since, reason = time.monotonic() - self._last_refused[1], getattr(self.end, "last_refusal", "")
+        return f"messages are refused: {reason}" if since < SELDOM else ""
+
     def news(self) -> Iterator[str]:
         """Yield the events since the last call: connection lost, connected again, messages refused."""
         name = self.name
@@ -94,7 +101,9 @@ class Link:
             self._told = ""
             yield f"{name}: connected again"
         (told, at), now = self._refused, time.monotonic()
-        if (refused := getattr(self.end, "refused", 0)) > told and now - at >= SELDOM:
+        if (refused := getattr(self.end, "refused", 0)) > self._last_refused[0]:
+            self._last_refused = (refused, now)
+        if refused > told and now - at >= SELDOM:
             self._refused = (refused, now)
             yield f"{name}: {refused} messages refused; the last: {getattr(self.end, 'last_refusal', '')}"
 
@@ -165,7 +174,10 @@ class Outlet(Link):
             await within(TIMEOUT, self.sink.apply(self._newest))
 
     async def _work(self) -> None:
+        task = asyncio.current_task()
         while True:
+            if task is not None and task.cancelling():  # `asyncio.wait_for` of Python 3.11 may lose a cancellation
+                raise asyncio.CancelledError
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(OFTEN):
                     await self._news.wait()

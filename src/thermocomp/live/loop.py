@@ -5,6 +5,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from thermocomp.core.starting import describe_start
 from thermocomp.live.clock import ServiceClock
 from thermocomp.live.curves import Curves
 from thermocomp.live.events import Events
-from thermocomp.live.inforce import ConfirmedCorrections, confirms, suspensions
+from thermocomp.live.firstchange import step_changing
+from thermocomp.live.inforce import AtController, ConfirmedCorrections, confirms, suspensions
 from thermocomp.live.keeper import CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
@@ -78,7 +80,8 @@ class Service:
         self._heard = self.clock.tick()
         self._untimely = "", -math.inf  # why the stamp of a reading was invalid, and when
         self._told_behind = -math.inf
-        self._told_untimely, self._begun, self._there = -math.inf, False, dict[str, str]()
+        self._told_untimely, self._begun, self._shown = -math.inf, False, dict[str, Status]()
+        self._since = f"{datetime.fromtimestamp(self.clock.now(), UTC):%Y-%m-%d %H:%M} UTC"
 
     # -- interface -----------------------------------------------------------------------------------------------------
 
@@ -132,7 +135,7 @@ class Service:
             self._told_behind = tick
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
         probings, learned, started = self.probings.take(), self.state.learned, self.state.references.keys()
-        self.state, said = self.compensator.step(self.state, Reading(now, fresh), now, probings, tick)
+        self.state, said = step_changing(self.compensator, self.state, Reading(now, fresh), probings, tick, self._since)
         self._heard = tick
         for target in [t for t, o in self.state.orders.items() if o == AVERAGED and t in self.state.raw]:
             self.state, self.keeper.no_zero = rezero(self.compensator, self.state, target, now, "new zero"), None
@@ -143,7 +146,7 @@ class Service:
             self.say("sensor", off)
         self.counts["readings"] += 1
         self.counts["rejected"] += bool(said.rejected)
-        self._tell(said, probings)
+        said = self._tell(said, probings)
         if self.recorder is not None:
             self.recorder.take(now, fresh, said)
             self.recorder.count(now, self.state.references)
@@ -218,6 +221,10 @@ class Service:
             self._put(self.state.corrections)
         for outlet in self.outlets:
             await outlet.flush()
+
+    def find_status(self, target: str) -> tuple[Status, AtController]:
+        """Return the status of a target as it is reported everywhere, and what is known at the controllers."""
+        return self.in_force.find_status(target, self.said, self.state, self.outlets)
 
     @property
     def untimely(self) -> str:
@@ -331,19 +338,16 @@ class Service:
             if self._ending:
                 continue
             await self._learn_start()
-            for target in self.compensator.lines:  # what was confirmed, and is no longer, or again
-                if any(isinstance(o.sink, Suspending) and o.receives(target) for o in self.outlets):
-                    continue  # it reports its alarms itself
-                there = self.in_force.at_controller(target, self.outlets)
-                if there.word != self._there.get(target, there.word):
-                    self.say("link", f"{target} {there.word}" + (f": {there.reason}" if there.reason else ""))
-                self._there[target] = there.word
+            said = self.said
             if silent > max(2.0, 2.0 * self.clock.speed):
-                why = f"no reading for {silent:.0f} s" + (f": {self.untimely}" if self.untimely else "")
+                reasons = [self.untimely, *(f"{one.name}: {one.refusing}" for one in self.inlets if one.refusing)]
+                why = ": ".join([f"no reading for {silent:.0f} s", *filter(None, reasons)])
                 self.state, said = self.compensator.wait(self.state, tick, why)
-                self._tell(said, {})
-                if self.recorder is not None:
-                    self.recorder.tell(self.clock.now(), said)
+                said = self._tell(said, {})
+            elif said is not None:  # a controller may have ceased to confirm
+                said = said._replace(states=self._show())
+            if self.recorder is not None and said is not None:
+                self.recorder.tell(self.clock.now(), said)
             if self._dirty and time.monotonic() - self._saved >= 1.0:
                 self._dirty, self._saved = False, time.monotonic()
                 await asyncio.to_thread(self.keeper.save, self.state)
@@ -353,13 +357,21 @@ class Service:
                     self._trouble = trouble
                     self.say("service", f"journal: {trouble or 'all rows are written again'}")
 
-    def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> None:
-        before, self.said = self.said, said
-        statuses = {t: TargetStatus(s.word, s.reason, said.half_widths.get(t)) for t, s in said.states.items()}
-        self._put(said.corrections, statuses)
-        for target, status in said.states.items():
-            if before is None or before.states.get(target, Status("active")).word != status.word:
+    def _show(self) -> dict[str, Status]:
+        """Return the status of each target as it is reported, with an event for each one whose word has changed."""
+        shown = {t: self.find_status(t)[0] for t in self.compensator.lines}
+        for target, status in shown.items():
+            if self._shown.get(target, Status("active")).word != status.word:
                 self.say("state", f"{target} {status.word}" + (f": {status.reason}" if status.reason else ""))
+        self._shown = shown
+        return shown
+
+    def _tell(self, said: Compensated, probings: Mapping[str, Probing]) -> Compensated:
+        """Send corrections, report what has changed, and return the output with the states as reported."""
+        before, self.said = self.said, said
+        shown = self._show()
+        statuses = {t: TargetStatus(s.word, s.reason, said.half_widths.get(t)) for t, s in shown.items()}
+        self._put(said.corrections, statuses)
         for name, fault in said.failed.items():
             if before is None or before.failed.get(name) != fault:
                 cause = " (a drift, or heat that the training did not contain)" if fault == UNSURE else ""
@@ -376,6 +388,7 @@ class Service:
             )
         self.curves.take(self.clock.now(), said, self.latest)
         self._dirty = True
+        return said._replace(states=shown)
 
     def _hear(self, sink: Sink, in_force: Mapping[str, Correction]) -> None:
         """Process the correction in force reported by a controller, and the reason if there is none."""

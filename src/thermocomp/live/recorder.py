@@ -68,7 +68,7 @@ class Recorder:
         self._references: dict[str, Reference] = {}
 
     def take(self, time: float, values: Mapping[str, float], said: Compensated) -> None:
-        """Write a reading to the journal, and what it changed."""
+        """Write a reading to the journal, and what it changed; `said` contains the states as reported."""
         self.journal.add(ReadingRow(time, values))
         self.tell(time, said)
 

@@ -109,6 +109,10 @@ class TemperatureFeed:
             longest=max(feed.longest, interval) if few else feed.longest,
         )
 
+    def unchanged(self, feed: FeedState) -> bool:
+        """Return whether no temperature has ever changed: the source may never have measured."""
+        return bool(feed.steps) and min(feed.steps) > LARGEST
+
     def explain(self, feed: FeedState) -> str:
         """Return why the feed has stopped; empty if it has not."""
         limits = self._thresholds

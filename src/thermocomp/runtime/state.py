@@ -15,7 +15,12 @@ from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.watch import WatchState
 
-Word = Literal["active", "holding", "fading", "suspended", "shadow", "restarting", "no zero", "unknown", "first start"]
+#: words of a service in place of ``active``, if no controller confirms the correction
+Unconfirmed = Literal["sent, not confirmed", "not confirmed", "not sent", "no sink"]
+#: states of a target
+Word = Literal[
+    "active", "holding", "fading", "suspended", "shadow", "restarting", "no zero", "unknown", "first start", Unconfirmed
+]  # fmt: skip
 #: order of a target whose models have no valid zero: its correction is held until it is re-zeroed
 NO_ZERO: Word = "no zero"
 #: orders under which the correction in force is not known

@@ -37,10 +37,15 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
         raise ReadingError(f"a message of {len(content):,} values; at most {MOST_VALUES:,} are accepted")
     stamp = content.pop("time", None)
     if stamp is not None and _number(stamp) is None:
-        raise ReadingError(f"a message with time {escape(stamp, 40)!r}: expected seconds since 1970")
+        raise ReadingError(
+            f"a message with time {escape(stamp, 40)!r}: expected seconds since 1970 as a number, such as "
+            "1790000000.0; without time a message counts from its arrival"
+        )
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
     if not values:
-        raise ReadingError('a message without any number; expected a number for each channel, {"t1_C": 21.3}')
+        raise ReadingError(
+            'a message without any number; expected a number, not in quotes, for each channel: {"t1_C": 21.3}'
+        )
     return Reading(arrived if stamp is None else float(stamp), values)
 
 

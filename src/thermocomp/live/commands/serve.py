@@ -6,6 +6,7 @@ import secrets
 import signal
 from collections.abc import Coroutine, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,7 @@ def _serve(settings: "ServiceSettings", port: int | None, *, check: bool) -> int
     from thermocomp.live.build import build
     from thermocomp.live.config import Page
     from thermocomp.live.findings import find_faults, find_faults_now
-    from thermocomp.live.page import web
+    from thermocomp.live.page import orders, web
     from thermocomp.live.page.page import make_app
 
     page = settings.config.page
@@ -88,19 +89,23 @@ def _serve(settings: "ServiceSettings", port: int | None, *, check: bool) -> int
         raise InputError("\n".join(["invalid configuration:", *(f"  {f}" for f in found)]))
     service = build(settings)
     for target in service.compensator.lines:
-        order = service.state.orders.get(target)
-        console.print(
-            words(f"{target}: {'may run' if order is None else f'{order.word}: {order.reason}'}"), soft_wrap=True
-        )
+        order, there = service.state.orders.get(target), service.find_status(target)[1]
+        told = f"{order.word}: {order.reason}" if order else there.reason if there.word == "no sink" else "may run"
+        console.print(words(f"{target}: {told}"), soft_wrap=True)
     token = web.read_token(settings.folder / page.token_file) if page is not None and page.token_file else ""
     if check:
         return 0
     work: list[Coroutine[Any, Any, None]] = []
+    service.in_force.way = lambda _target, _order: orders.NO_TOKEN
     if page is not None:
         listening = web.listen(page.host, page.port)
         host, number = listening.getsockname()[:2]
         where = f"[{host}]" if ":" in host else host
         console.print(words(f"Page: http://{where}:{number}"), soft_wrap=True)
+        if token:
+            here = {"0.0.0.0": "127.0.0.1", "[::]": "[::1]"}.get(where, where)
+            kept = (settings.folder / page.token_file).resolve()
+            service.in_force.way = partial(orders.explain_way, url=f"http://{here}:{number}", token_file=kept)
         app = make_app(service, token, page.settled, (page.host, *page.hosts), page.pages)
         work.append(web.serve(app, listening))
     asyncio.run(_run(service, settings.config.at_stop == "fade", [service.run(), *work]))

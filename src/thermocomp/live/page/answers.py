@@ -26,7 +26,7 @@ class Overall(AnswerPart):
 class AtControllerAnswer(AnswerPart):
     """What is known of a correction at the controller."""
 
-    state: Literal["confirmed", "sent, not confirmed", "not confirmed", "not sent"]
+    state: Literal["confirmed", "sent, not confirmed", "not confirmed", "not sent", "no sink"]
     reason: str
     correction_um: Number
     age_s: Annotated[Number, Field(description="real time since the confirmation")]
@@ -65,7 +65,7 @@ class SensorAnswer(AnswerPart):
     name: str
     value: Number
     age_s: Number
-    state: Annotated[str, Field(description="good, not watched, stale, or the fault")]
+    state: Annotated[str, Field(description="good, not watched, unchanged, stale, or the fault")]
 
 
 class LinkAnswer(AnswerPart):

@@ -1,5 +1,8 @@
 """Manual commands: start, run, hold, shadow, rezero, roll back; authorised by the token."""
 
+import json
+import shlex
+from pathlib import Path
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, HTTPException, Request
@@ -25,6 +28,22 @@ class PageOrder(BaseModel):
 
 #: the body is read by hand: its size and its encoding are checked first
 _BODY = {"required": True, "content": {"application/json": {"schema": PageOrder.model_json_schema()}}}
+
+
+#: names of the buttons of orders that are asked for
+_BUTTONS = {"start": "Start", "rezero": "Re-zero"}
+#: why there is no way to give an order
+NO_TOKEN = " (orders need a page with a token: set token_file in [page])"
+
+
+def explain_way(target: str, order: str, url: str, token_file: Path) -> str:
+    """Return how a person gives an order: the button of the page, or a command."""
+    body, header = (
+        json.dumps({"target": target, "do": order}),
+        f"Authorization: Bearer $(cat {shlex.quote(str(token_file))})",
+    )
+    command = f'curl -H "{header}" -d {shlex.quote(body)} {url}/api/order'
+    return f". On the page: enter the token of {token_file}, press {_BUTTONS[order]} at {target}; or run: {command}"
 
 
 def make_router(board: Board) -> APIRouter:

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from thermocomp.core.ports import Probe
-from thermocomp.live.inforce import AtController
 from thermocomp.live.links import Link, Outlet
 from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
@@ -15,7 +14,7 @@ from thermocomp.runtime.watch import UNSURE
 
 #: states of a target, the one that needs attention most first
 ORDER = (
-    *("unknown", "first start", "no zero", "not confirmed", "fading", "holding", "suspended", "not sent"),
+    *("unknown", "first start", "no zero", "not confirmed", "fading", "holding", "suspended", "no sink"),
     *("restarting", "shadow", "sent, not confirmed", "active"),
 )
 
@@ -38,8 +37,11 @@ def snapshot(service: Service, settled: float) -> dict[str, Any]:
     watched = {name for watch in service.compensator.watches for name in watch.failing}
     feed = service.compensator.feed
     repeated = feed.names if feed.explain(service.state.feed) else ()
+    unchanged = service.state.feed.repeated >= 1.0 and feed.unchanged(service.state.feed)
 
     def word(name: str, age: float) -> str:
+        if unchanged and name in feed.names:
+            return "unchanged"
         if age > service.compensator.limits.reading_age or name in repeated:
             return "stale"
         return "good" if name in watched else "not watched"
@@ -71,14 +73,14 @@ def find_alarms(service: Service) -> Iterator[str]:
     """Yield what needs attention: lost links, corrections that differ, sensors, time stamps, files not written."""
     said = service.said
     for name in service.compensator.lines:
-        there = service.in_force.at_controller(name, service.outlets)
-        order = service.state.orders.get(name)
-        if order is not None and order.word in (*UNKNOWN, NO_ZERO):
-            yield f"{name}: {order.word}: {order.reason}"
-        waits = order is not None and order.word in UNKNOWN
-        if there.word == "not confirmed" and not waits and name not in service.compensator.shadow:
+        status, there = service.find_status(name)
+        if status.word in (*UNKNOWN, NO_ZERO):
+            yield f"{name}: {status.word}: {status.reason}"
+        if there.word == "not confirmed" and name not in service.compensator.shadow:
             yield f"{name}: not confirmed: {there.reason}"
     for one in service.links():
+        if one.refusing:
+            yield f"{one.name}: {one.refusing}"
         if (link := one.status()).state == "failed" or (link.state == "closed" and link.reason and not one.ended):
             yield f"{one.name}: {link.reason}"
     if service.untimely:
@@ -100,10 +102,13 @@ def _overall(targets: Sequence[dict[str, Any]], alarms: Sequence[str]) -> dict[s
     running = [t for t in targets if t["runs"]] or list(targets)
     if not running:
         return {"word": "restarting", "reason": "there is no target"}
+    unsent = [t for t in running if t["state"] == "no sink"]
+    running = [t for t in running if t not in unsent] or running
     worst = min(running, key=lambda t: ORDER.index(t["state"]) if t["state"] in ORDER else 0)
     if worst["state"] in ("active", "sent, not confirmed") and alarms:
         return {"word": f"{worst['state']}, with an alarm", "reason": alarms[0]}
-    return {"word": worst["state"], "reason": f"{worst['name']}: {worst['reason']}" if worst["reason"] else ""}
+    told = worst if worst["reason"] else unsent[0] if unsent else None
+    return {"word": worst["state"], "reason": f"{told['name']}: {told['reason']}" if told else ""}
 
 
 def curves(service: Service) -> dict[str, list[float | None]]:
@@ -116,22 +121,15 @@ def curves(service: Service) -> dict[str, list[float | None]]:
 def _target(service: Service, name: str, line: DeviationLine, settled: float) -> dict[str, Any]:
     said, correction = service.said, service.state.corrections[name]
     deviation = said.deviations.get(name) if said else None
-    status = said.states.get(name) if said else service.state.orders.get(name)
+    status, there = service.find_status(name)
     reference = service.state.references.get(name)
     rows = [r for r in service.curves if f"{name} predicted" in r]
     left = minutes_until([r["time"] for r in rows], [r[f"{name} predicted"] for r in rows], settled)
     learned = service.state.learned.get(name)
-    there = service.in_force.at_controller(name, service.outlets)
-    word: str = status.word if status else "restarting"
-    reason = status.reason if status else "waits for its first reading"
-    if (order := service.state.orders.get(name)) is not None and order.word in UNKNOWN:
-        word, reason, there = order.word, order.reason, AtController("not sent", order.reason)
-    if word == "active" and there.word != "confirmed":
-        word, reason = there.word, there.reason
     return {
         "name": name,
-        "state": word,
-        "reason": reason,
+        "state": status.word,
+        "reason": status.reason,
         "at_controller": {
             "state": there.word,
             "reason": there.reason,

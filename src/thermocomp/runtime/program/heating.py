@@ -1,5 +1,6 @@
 """Supervision of the spindle speeds with scalars and loops only: see `thermocomp.runtime.heat` for explanations."""
 
+from thermocomp.runtime.heat import LEAD
 from thermocomp.runtime.program.language import choose, each, function, let, procedure, raised, when
 from thermocomp.runtime.program.numbers import follow, larger, smaller
 from thermocomp.runtime.program.values import Number, flag, real
@@ -35,8 +36,11 @@ def find_speeds(s: Kept, w: Work, t: Constants) -> None:
         w.found_speed[k] = w.speed[k]
         with when(c >= 0):
             share = let("share", real(0.0))
+            caused = let("caused", s.estimate[c])
+            with when(w.speed_lost[k] & s.fault[t.speed_fault[k]].differs(OFF)):
+                caused.set(larger(s.heat[c] + LEAD * (s.estimate[c] - s.heat[c]), real(0.0)))
             with when(s.estimate[c] > t.unseen[t.SENSORS + c]):
-                share.set(smaller(raised(s.estimate[c], t.heat_root[c]), t.heat_factor))
+                share.set(smaller(raised(caused, t.heat_root[c]), t.heat_factor))
             w.found_speed[k] = t.top_speed * share
 
 
