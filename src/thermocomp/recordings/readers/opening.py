@@ -8,16 +8,25 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.recordings.readers.described import name_channels
 from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ADAPTER, Mapping, ReadOptions
+from thermocomp.recordings.readers.mtconnect import open_mtconnect
 from thermocomp.recordings.readers.parquet import open_parquet
+from thermocomp.recordings.readers.pivoting import pivot
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.textfile import open_csv
 from thermocomp.recordings.readers.workbook import open_workbook
 
-_TEXTS = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_TEXTS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
 _OPEN: dict[str, Callable[[Path, ReadOptions, FileLimits], FileTable]]
-_OPEN = {**dict.fromkeys(_TEXTS, open_csv), ".xlsx": open_workbook, ".ods": open_workbook, ".parquet": open_parquet}
+_OPEN = {
+    **dict.fromkeys(_TEXTS, open_csv),
+    ".xlsx": open_workbook,
+    ".ods": open_workbook,
+    ".parquet": open_parquet,
+    ".xml": open_mtconnect,
+}
 
 
 def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
@@ -33,7 +42,8 @@ def open_table(path: str | Path, mapping: Mapping) -> tuple[FileTable, str]:
         check_file(path, mapping.limits)
         with path.open("rb") as f:
             sha256 = hashlib.file_digest(f, "sha256").hexdigest()
-        return _OPEN[ending](path, mapping.read, mapping.limits), sha256
+        table = _OPEN[ending](path, mapping.read, mapping.limits)
+        return (table if table.embedded else name_channels(pivot(table, mapping), mapping)), sha256
     except FileNotFoundError as e:
         others = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         near = get_close_matches(path.name, others, n=1)

@@ -18,7 +18,7 @@ from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is
 #: key of the column description embedded by thermocomp, in a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
 #: maximum number of cells used to determine the kind of a column
-_HEAD = 100
+HEAD = 100
 #: maximum number of cell locations listed
 _MOST_TOLD = 40
 _UNGROUPED = re.compile(r"[-+]?\d{4}")
@@ -46,6 +46,8 @@ class FileTable(ABC):
         Decimal sign of numbers stored as text, if it is known beforehand.
     notes : tuple of str
         Notes for the user.
+    above : tuple of tuple of str
+        Rows of text around the headings.
     """
 
     path: Path
@@ -53,6 +55,7 @@ class FileTable(ABC):
     embedded: str = field(default="", kw_only=True)
     decimal: str = field(default="", kw_only=True)
     notes: tuple[str, ...] = field(default=(), kw_only=True)
+    above: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
 
     @abstractmethod
     def is_number(self, column: int, *, empty: bool = True) -> bool:
@@ -126,7 +129,7 @@ def first_texts(cells: "pd.Series[Any]") -> list[str]:
     """Return the first non-empty cells of a column as text; none for a numeric column."""
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return []
-    return [text for text in map(str, cells.iloc[:_HEAD].dropna()) if not is_filler(text)]
+    return [text for text in map(str, cells.iloc[:HEAD].dropna()) if not is_filler(text)]
 
 
 def as_floats(cells: "pd.Series[Any]") -> FloatArray:

@@ -13,11 +13,13 @@ import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
+from thermocomp.recordings.readers.labelled import find_delimiter, open_labelled
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
     FileLayout,
     find_end,
     find_layout,
+    find_rest,
     join_units,
     name_stamps,
     tell_again,
@@ -28,6 +30,7 @@ from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
 from thermocomp.recordings.readers.tables import (
+    HEAD,
     FileTable,
     check_headings,
     clean_heading,
@@ -38,7 +41,7 @@ from thermocomp.recordings.readers.tables import (
 from thermocomp.recordings.readers.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
 
 #: maximum number of lines used to detect the format; fewer if they are long
-_SAMPLE_LINES = 100
+_SAMPLE_LINES = 300
 _SAMPLE_BYTES = 2 << 20
 _CHUNK = 100_000  # rows in memory as text at a time
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
@@ -164,10 +167,12 @@ class CsvTable(FileTable):
         }
 
 
-def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
+def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
     """Detect the format of a text file in a single pass over its lines, without storing them."""
     data, told = bring_to_utf8(path, limits)
     lines = open_lines(path, data, options, limits)
+    if labelled := find_delimiter(lines):
+        return open_labelled(lines, labelled)
     head = _read_head(lines)
     delimiter, layout, first = head.delimiter, head.layout, head.lines
     body = _scan(lines, head)
@@ -201,7 +206,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
         path=path,
         data=data,
         headings=tuple(headings),
-        sample=tuple(map(tuple, rows)),
+        sample=tuple(map(tuple, rows[:HEAD])),
         delimiter=delimiter,
         decimal=options.decimal,
         encoding=encoding,
@@ -209,6 +214,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
         skipped=tuple(sorted((*body.skipped, *remarks))),
         n_rows=body.n_rows - len(remarks),
         embedded=lines.embedded(),
+        above=find_rest([split(line) for _, line in first[: layout.begin]], layout),
         notes=(
             *told,
             *tell_layout([number + 1 for number, _ in first], layout, "line"),
