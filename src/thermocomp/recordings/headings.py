@@ -38,8 +38,8 @@ _AXIS = re.compile(r"[xyzuvw]\d?")
 _TURNING = ("spindle", "speed", "spindel", "drehzahl", "broche", "mandrin", "husillo", "mandrino")
 #: names that define the quantity, whatever the unit
 _NAMES = {
-    "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "temperature": re.compile(r"t\d+|tc ?\d+|.*\btemp(?:\b|[ _.\d]|er).*|.*temperatur.*"),
+    "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "displacement": re.compile(
         r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"
     ),

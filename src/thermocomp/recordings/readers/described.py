@@ -21,16 +21,15 @@ def name_channels(table: FileTable, mapping: Mapping) -> FileTable:
     """Return a table whose columns have the names that the rows above state; those that a mapping names are kept."""
     used = {rule.column or name for name, rule in mapping.columns.items()}
     used |= {mapping.time.column, mapping.time.date, mapping.cycles.column}
-    listed = {**_read_list(table.above), **_read_row(table)}
+    listed, row = _read_list(table.above), _read_row(table)
     found: dict[int, tuple[str, str]] = {}
     for k, heading in enumerate(table.headings):
         split = BRACKETS.fullmatch(heading)
         base = split["base"] if split else heading
         if whole := _WHOLE.fullmatch(heading):
             found[k] = whole["name"].strip(), (whole["unit"] or "").strip(" ()")
-        elif base.casefold() in listed and not is_understood(base):
-            name, unit = listed[base.casefold()]
-            found[k] = name, (split["square"] or split["round"] or "") if split else unit
+        elif not is_understood(base) and (said := row.get(k) or listed.get(base.casefold())):
+            found[k] = said[0], (split["square"] or split["round"] or "") if split else said[1]
         if k in found and not used.isdisjoint((heading, base)):
             del found[k]
     counts = Counter(name.casefold() for name, _ in found.values())
@@ -67,12 +66,12 @@ def _read_list(above: Sequence[Sequence[str]]) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _read_row(table: FileTable) -> dict[str, tuple[str, str]]:
-    """Return the names by heading, from a row whose first cell is a label and that names all columns of numbers."""
-    bases = [BRACKETS.sub(r"\g<base>", heading).casefold() for heading in table.headings]
+def _read_row(table: FileTable) -> dict[int, tuple[str, str]]:
+    """Return the names by column, from a row whose first cell is a label and whose others are different names."""
+    width = len(table.headings)
     for row in table.above:
-        if row and _bare(row[0]) in _NAMES and len(row) in (len(bases), len(bases) + 1):
-            named = {k: row[k].strip() for k in range(1, len(bases)) if row[k].strip()}
+        if row and _bare(row[0]) in _NAMES and len(row) in (width, width + 1):
+            named = {k: row[k].strip() for k in range(1, width) if row[k].strip()}
             if len(named) > 1 and len({*named.values()}) == len(named):
-                return {bases[k]: (name, "") for k, name in named.items()}
+                return {k: (name, "") for k, name in named.items()}
     return {}

@@ -6,19 +6,20 @@ below. Columns may have their own times; further headers start further segments.
 
 import re
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from thermocomp.core.arrays import FloatArray
-from thermocomp.core.exceptions import RecordingError, TwoReadingsError
+from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.encodings import find_encoding
 from thermocomp.recordings.readers.numbers import is_number_like
 from thermocomp.recordings.readers.series import Clock, Series, join_series, seconds_to_ns
 from thermocomp.recordings.readers.tables import FrameTable
 from thermocomp.recordings.readers.textlines import Lines, is_utf8, split_line
+from thermocomp.recordings.readers.timefaults import refuse_tests
 
 _SIGN = re.compile(rb"(?:\xef\xbb\xbf)?\"?(?:Writer_Version|Starttime of export|SampleTime\[ms\])\"?([\t;,])")
 #: number of lines in which the kind of file is recognised
@@ -141,17 +142,16 @@ def _times(segment: _Segment, column: int, channel: int) -> FloatArray:
     """Return the times of a channel [s], from their column or from the first instant and the interval."""
     said = segment.numbers(column)
     if "SampleTime[ms]" in segment.header or "Starttime of export" in segment.header:
-        said = said - _WINDOWS / 1.0 if np.nanmax(said, initial=0) > _WINDOWS else said
+        said = said - _WINDOWS if np.nanmax(said, initial=0) > _WINDOWS else said
         if np.nanmax(said, initial=0) > _WINDOWS / 1e4:  # 100 ns since 1970
-            return np.asarray((said - float(_begin(segment, channel)) / 100) * 1e-7)
-        every = segment.cell("SampleTime[ms]", channel)
-        step = float(every.replace(",", ".")) if is_number_like(every) else 1.0
-        counted = len(said) > 1 and float(np.nanmedian(np.diff(said))) == 1.0
-        return said * (step if counted else 1.0) * 1e-3
+            return np.asarray((said - _begin(segment, channel) / 100) * 1e-7, dtype=np.float64)
+        every = segment.cell("SampleTime[ms]", channel).replace(",", ".")
+        counted = is_number_like(every) and len(said) > 1 and float(np.nanmedian(np.diff(said))) == 1.0
+        return np.asarray(said * (float(every) if counted else 1.0) * 1e-3, dtype=np.float64)
     if np.isfinite(said).any():
         return said
-    first, step = (segment.cell(key, channel).replace(",", ".") for key in ("X0", "Delta_X"))
-    return float(first or 0) + float(step or np.nan) * np.arange(len(said))
+    start, step = (segment.cell(key, channel).replace(",", ".") for key in ("X0", "Delta_X"))
+    return np.asarray(float(start or 0) + float(step or np.nan) * np.arange(len(said)), dtype=np.float64)
 
 
 def _begin(segment: _Segment, column: int) -> int:
@@ -165,10 +165,5 @@ def _begin(segment: _Segment, column: int) -> int:
 
 def _refuse_restart(segments: list[_Segment], parts: list[Series], path: Path) -> None:
     """Reject segments whose times start again: they are separate tests."""
-    if any(a.times[-1] >= b.times[0] for a, b in zip(parts, parts[1:], strict=False)):
-        spans = [[s.lines[0], s.lines[-1]] for s in segments]
-        raise TwoReadingsError(
-            f"{path}: line {spans[1][0]}: the time starts again below a repeated heading: the file holds "
-            f"{len(spans)} tests; read one of them by skipping the lines of the others in a mapping, [read] skip",
-            [{"read": {"skip": [span for span in spans if span is not kept]}} for kept in spans],
-        )
+    if any(a.times[-1] >= b.times[0] for a, b in pairwise(parts)):
+        refuse_tests(str(path), [[s.lines[0], s.lines[-1]] for s in segments])

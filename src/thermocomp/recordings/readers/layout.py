@@ -20,6 +20,7 @@ from thermocomp.recordings.headings import (
     is_understood,
     understand,
 )
+from thermocomp.recordings.readers.cellunits import has_unit
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
 from thermocomp.recordings.words import read_words
 
@@ -70,8 +71,8 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     # any preamble ends before the second half of the rows
     later = rows[len(rows) // 2 :]
     width, columns = find_columns(later)
-    numbers = [k for k in columns if _holds_numbers(later, k)]
-    timed = sorted({*columns} - {*numbers})
+    timed = find_timed(later)
+    numbers = [k for k in columns if k not in timed]
     units_at = cache(lambda k: _is_units(rows[k], numbers))  # evaluated only as needed, because files may be wide
 
     def labels(k: int) -> bool:
@@ -246,6 +247,11 @@ def find_columns(rows: Sequence[Sequence[str]]) -> tuple[int, list[int]]:
     return width, [k for k in range(width) if 2 * values[k] >= len(even) and values[k]]
 
 
+def find_timed(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return the columns with dates or times of day in most rows."""
+    return [k for k in find_columns(rows)[1] if not _holds_numbers(rows, k)]
+
+
 def _is_text(row: Sequence[str], width: int) -> bool:
     # a logger may end its rows, but not its headings, with a delimiter
     return len(row) in (width, width - 1) and any(cell.strip() for cell in row)
@@ -302,4 +308,4 @@ def _count_filled(row: Sequence[str], columns: Sequence[int]) -> int:
 
 
 def _is_value(cell: str) -> bool:
-    return is_number_like(cell) or is_stamp(cell)
+    return is_number_like(cell) or is_stamp(cell) or has_unit(cell)

@@ -293,8 +293,8 @@ class _Dialogue:
 
 
 def _skips(remedy: Remedy) -> bool:
-    """Return whether a suggested mapping entry skips a row of the file."""
-    return "skip" in remedy.get("read", {})
+    """Return whether a suggested mapping entry skips a row of the file; ranges of rows are other tests."""
+    return any(isinstance(place, int) for place in remedy.get("read", {}).get("skip", ()))
 
 
 def _offer(path: Path, mapping: Mapping, error: InputError) -> str:

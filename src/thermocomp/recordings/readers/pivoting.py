@@ -1,6 +1,8 @@
 """Long tables: one row per reading, with its time, the name of its channel, and its value."""
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -11,6 +13,7 @@ from thermocomp.core.exceptions import InputError, TwoReadingsError
 from thermocomp.core.units import is_unit
 from thermocomp.recordings.headings import is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import find_kind
+from thermocomp.recordings.readers.cellunits import has_unit
 from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, find_column_kind
 from thermocomp.recordings.readers.guesses import understand_or_none
 from thermocomp.recordings.readers.mapping import Mapping
@@ -32,53 +35,67 @@ _ATTRIBUTE = re.compile(r"unit_of_measurement[\"']?\s*[:=]\s*[\"']?([^\"',}]+)")
 def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     """Return a long table as one with a column per channel; another table unchanged."""
     headings = table.headings
-    if len(headings) > _MOST_COLUMNS:
+    value, ids, units = _find_columns(headings)
+    if value is None or not ids:
         return table
-    names = [plain_name(h).strip("_@ ") for h in headings]
-    value = next((names.index(word) for word in _VALUES if word in names), None)
-    ids = [names.index(word) for word in _IDS if word in names and names.index(word) != value]
     meanings = [understand_or_none(h) for h in headings]
-    channels = [k for k, m in enumerate(meanings) if m and m.unit.quantity != "time" and not is_time_name(m.base)]
-    if value is None and len(channels) == 1:
-        value = channels[0]
-    ids = [k for k in ids if k not in channels]
-    if value is None or not ids or {*channels} - {value}:
-        return table
     try:
         plan = find_time(table, meanings, mapping, cache(partial(find_column_kind, table)))
     except InputError:
         return table
-    units = [k for k, name in enumerate(names) if name in (*_UNITS, "attributes")]
     wanted = dict.fromkeys(k for k in (plan.time, plan.date, value, *ids, *units) if k is not None)
     cells = table.load([], list(wanted))[0].astype(object)
     cells = cells[cells[plan.time].notna() & cells[value].notna()]
-    labels = _label(cells, ids)
-    if not len(cells) or labels.nunique() > _MOST_CHANNELS or (labels.nunique() < 2 and value in channels):
+    labels = _label(cells, ids) if len(cells) else pd.Series(dtype=object)
+    if not 0 < labels.nunique() <= _MOST_CHANNELS or (labels.nunique() < 2 and meanings[value] is not None):
         return table
     shown = cells[plan.time].astype(str)
     if plan.date is not None:
         shown = cells[plan.date].astype(str) + " " + shown
-    times, zone, notes = _instants(shown.reset_index(drop=True), headings[plan.time], table, mapping)
-    if times is None:
+    instants = _instants(shown.reset_index(drop=True), headings[plan.time], table, mapping)
+    if instants is None:
         return table
-    common = meanings[value]
-    series, dropped = [], []
+    times, zone, notes = instants
+    series, dropped = list[Series](), list[str]()
     for label, rows in cells.groupby(labels.to_numpy(), sort=False).indices.items():
         part = cells.iloc[rows]
         texts = part[value].astype(str)
         filled = [cell for cell in texts if not is_filler(cell)]
-        if 2 * sum(map(is_number_like, filled)) <= len(filled):
+        if 2 * sum(is_number_like(cell) or has_unit(cell) for cell in filled) <= len(filled):
             dropped.append(str(label))
             continue
+        common = meanings[value]
         unit = _unit(part[units]) or (common.unit.symbol if common else "")
         series.append(Series(_heading(str(label), unit), times[rows], texts.to_numpy(dtype=object)))
     if not series:
         return table
+    heads = [s.heading.partition(".")[2] for s in series]
+    if all(heads) and len({*heads}) == len(heads):  # sensor.t1, as Home Assistant writes
+        series = [replace(s, heading=head) for s, head in zip(series, heads, strict=True)]
+    decimal = table.decimal or "." * (getattr(table, "delimiter", "") == ",")
     told = [*table.notes, *notes, f"a long table: {headings[value]!r} holds the values of {len(series)} channels"]
     told += [f"not read, holding no numbers: {', '.join(dropped)}"] * bool(dropped)
-    return join_series(
-        table.path, series, Clock(headings[plan.time] if zone else "time_s", zone), mapping.limits, told, table.decimal
-    )
+    clock = Clock(headings[plan.time] if zone else "time_s", zone)
+    return join_series(table.path, series, clock, mapping.limits, told, decimal)
+
+
+def _find_columns(headings: Sequence[str]) -> tuple[int | None, list[int], list[int]]:
+    """Return the columns of the values, of the names of the channels, and of the units; none in a wide table."""
+    if len(headings) > _MOST_COLUMNS:
+        return None, [], []
+    names = [plain_name(h).strip("_@ ") for h in headings]
+    meanings = [understand_or_none(h) for h in headings]
+    channels = [k for k, m in enumerate(meanings) if m and m.unit.quantity != "time" and not is_time_name(m.base)]
+    bases = [
+        plain_name(m.base) if m and k in channels else name
+        for k, (m, name) in enumerate(zip(meanings, names, strict=True))
+    ]
+    value = next((bases.index(word) for word in _VALUES if word in bases), channels[0] if len(channels) == 1 else None)
+    if {*channels} - {value}:
+        return None, [], []
+    ids = [names.index(word) for word in _IDS if word in names]
+    units = [k for k, name in enumerate(names) if name in (*_UNITS, "attributes")]
+    return value, [k for k in dict.fromkeys(ids) if k != value], units
 
 
 def _label(cells: pd.DataFrame, ids: list[int]) -> "pd.Series[Any]":
@@ -92,12 +109,7 @@ def _label(cells: pd.DataFrame, ids: list[int]) -> "pd.Series[Any]":
     labels = parts[0]
     for part in parts[1:]:
         labels = labels + "_" + part
-    prefix = labels.str.partition(".")[0]
-    return (
-        labels.str.partition(".")[2]
-        if prefix.nunique() == 1 and labels.str.contains(".", regex=False).all()
-        else labels
-    )
+    return labels
 
 
 def _heading(label: str, unit: str) -> str:
@@ -116,7 +128,7 @@ def _unit(cells: pd.DataFrame) -> str:
 
 def _instants(
     shown: "pd.Series[Any]", heading: str, table: FileTable, mapping: Mapping
-) -> tuple[Any, Any, tuple[str, ...]]:
+) -> tuple[Any, Any, tuple[str, ...]] | None:
     """Return the instants of readings [ns], their zone, and notes; None if they are no timestamps."""
     numbers = pd.to_numeric(shown, errors="coerce").to_numpy(dtype=np.float64)
     meaning = understand_or_none(heading)
@@ -125,10 +137,12 @@ def _instants(
     for parts in PARTS:
         if np.isfinite(numbers).all() and EPOCH[0] * parts <= numbers.min() <= numbers.max() < EPOCH[1] * parts:
             return np.round(numbers * (1e9 / parts)).astype(np.int64), "UTC", (f"{heading!r} counts from 1970",)
+    zone: Any = "naive"
+    notes: tuple[str, ...] = ()
     if mapping.time.format:
-        stamps, zone, notes = parse(shown, mapping.time.format), "naive", ()
+        stamps = parse(shown, mapping.time.format)
     elif find_kind(shown.iloc[:100].tolist()) not in ("stamp", "date"):
-        return None, "", ()
+        return None
     else:
         try:
             found = parse_stamps(shown, heading)
@@ -138,9 +152,9 @@ def _instants(
                 [{"time": {"column": heading, "format": form}} for form in e.readings],
             ) from e
         if found is None:
-            return None, "", ()
+            return None
         stamps, notes = found.stamps, found.notes
         zone = (pd.Timestamp(found.start).tzinfo if found.start else None) or "naive"
     if stamps.isna().any():
-        return None, "", ()
+        return None
     return stamps.to_numpy(dtype="M8[ns]").view(np.int64), zone, notes

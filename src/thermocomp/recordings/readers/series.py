@@ -93,11 +93,13 @@ def _sorted(series: Series) -> Series:
 def _together(every: IntArray, series: Sequence[Series]) -> IntArray:
     steps = [float(np.median(np.diff(s.times))) for s in series if len(s.times) > 1]
     close = np.diff(every) < _TOGETHER * min(steps, default=0.0)
-    return every[np.append(~close, True)]
+    return np.asarray(every[np.append(~close, True)])
 
 
 def _hold(series: Series, every: IntArray) -> NDArray[Any]:
     at = np.searchsorted(series.times, every, side="right") - 1
     longest = int(np.diff(series.times).max()) if len(series.times) > 1 else 0
     there = (at >= 0) & (every - series.times[at] <= longest)
-    return np.where(there, series.values.astype(object)[at], None)
+    cells: NDArray[Any] = series.values.astype(object)[at]
+    cells[~there] = None
+    return cells

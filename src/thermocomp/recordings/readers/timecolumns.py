@@ -118,7 +118,8 @@ def _by_name(table: FileTable, meanings: Sequence[Meaning | None], kinds: Kinds)
     timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
     # of two columns with one name the first is used
     plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
-    named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
+    fractions = {k for k, h in enumerate(headings) if {plain_name(h), _bare_name(h)} & {*_FRACTIONS}}
+    named = [k for k, m in timed.items() if is_time_name(m.base) and k not in fractions]
     clear = [k for k in named if timed[k].base != "T"]  # T_s may be a surface temperature
     if clear:
         return clear[0], None, []
@@ -132,7 +133,10 @@ def _by_name(table: FileTable, meanings: Sequence[Meaning | None], kinds: Kinds)
     bare = [plain[name] for name in names if name not in _NEEDS_UNIT or kinds(plain[name]) in ("date", "stamp")]
     best = next(iter((*bare, *named)), None)
     # a number without a unit, such as that of the scan, only if no other column holds dates
-    uncertain = best is None or (best in bare and kinds(best) == "number" and not _is_epoch(table.head(best)))
+    head = table.head(best) if best is not None and best in bare else []
+    constant = len(head) > 1 and len(set(head)) == 1  # a duration; dates have a time of day beside them
+    counts = bool(head) and kinds(bare[0]) == "number" and not _is_epoch(head)
+    uncertain = best is None or counts or (constant and kinds(bare[0]) != "date")
     held = _by_cells(table, kinds) if uncertain else None
     if best is not None:
         return held or (best, None, [])
