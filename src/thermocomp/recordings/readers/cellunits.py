@@ -57,20 +57,16 @@ def _split(cell: str) -> tuple[str, str] | None:
 
 def _in_unit(cell: str, unit: str) -> str:
     parts = _split(cell)
-    if parts is None:
-        return cell
-    number, own = parts
+    number, own = parts or (cell, unit)
     if own == unit:
         return number
     try:
         said, meant = find_unit(own), find_unit(unit)
     except UnitError:
         return cell
-    if said.house != meant.house:
+    if said.house != meant.house or ("," in number and "." in number):
         return cell
     if (said.scale, said.shift) == (meant.scale, meant.shift):
         return number
-    if "," in number and "." in number:
-        return cell
     value = (float(number.replace(",", ".")) * said.scale + said.shift - meant.shift) / meant.scale
     return repr(round(value, 12)).replace(".", "," if "," in number else ".")

@@ -6,7 +6,8 @@ below. Columns may have their own times; further headers start further segments.
 
 import re
 from dataclasses import dataclass, field
-from itertools import islice, pairwise
+from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,19 @@ import pandas as pd
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.readers.encodings import find_encoding
+from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
+from thermocomp.recordings.readers.limits import FileLimits
+from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import is_number_like
 from thermocomp.recordings.readers.series import Clock, Series, join_series, seconds_to_ns
-from thermocomp.recordings.readers.tables import FrameTable
-from thermocomp.recordings.readers.textlines import Lines, is_utf8, split_line
+from thermocomp.recordings.readers.tables import FileTable, FrameTable
+from thermocomp.recordings.readers.textfile import open_csv
+from thermocomp.recordings.readers.textlines import Lines, is_utf8, open_lines, split_line
 from thermocomp.recordings.readers.timefaults import refuse_tests
 
 _SIGN = re.compile(rb"(?:\xef\xbb\xbf)?\"?(?:Writer_Version|Starttime of export|SampleTime\[ms\])\"?([\t;,])")
-#: number of lines in which the kind of file is recognised
-_FIRST = 30
+#: number of lines in which the kind of file is recognised, and of bytes of each
+_FIRST, _LONGEST = 30, 4096
 #: rows whose labels stand above the times, and whose other cells name the columns
 _NAMES = ("X_Value", "Name")
 _UNITS = ("Y_Unit_Label", "Unit")
@@ -53,15 +57,17 @@ class _Segment:
         return pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
 
 
-def find_delimiter(lines: Lines) -> str:
-    """Return the delimiter of a file with a labelled header; empty if it is another file."""
-    with lines.open() as f:
-        found = (_SIGN.match(line) for line in islice(f, _FIRST))
-        return next((match[1].decode() for match in found if match), "")
+def open_text(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
+    """Open a text file: with a labelled header as a table with one time, else as `open_csv` does."""
+    data, _ = bring_to_utf8(path, limits)
+    with path.open("rb") if data is None else BytesIO(data) as f:
+        signs = (_SIGN.match(f.readline(_LONGEST)) for _ in range(_FIRST))
+        delimiter = next((match[1].decode() for match in signs if match), "")
+    found = _open(open_lines(path, data, options, limits), delimiter) if delimiter else None
+    return open_csv(path, options, limits) if found is None else found
 
 
-def open_labelled(lines: Lines, delimiter: str) -> FrameTable:
-    """Read a file with a labelled header as a table with one time."""
+def _open(lines: Lines, delimiter: str) -> FrameTable | None:
     path, limits = lines.path, lines.limits
     content = list(lines.content([]))
     limits.check("recoded_bytes", sum(len(line) for _, line in content), path)
@@ -69,7 +75,7 @@ def open_labelled(lines: Lines, delimiter: str) -> FrameTable:
     encoding = lines.options.encoding or (find_encoding(odd) if odd else "utf-8")
     segments = _split([(n + 1, split_line(line.decode(encoding, "replace"), delimiter)) for n, line in content])
     if not segments:
-        raise RecordingError(f"{path}: a header but no rows of numbers below it; the recording is empty")
+        return None
     found: dict[str, list[Series]] = {}
     for segment in segments:
         for series in _read(segment, path):

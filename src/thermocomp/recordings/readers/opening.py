@@ -11,19 +11,19 @@ from pydantic import ValidationError
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.recordings.readers.cellunits import find_units
 from thermocomp.recordings.readers.described import name_channels
+from thermocomp.recordings.readers.labelled import open_text
 from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ADAPTER, Mapping, ReadOptions
 from thermocomp.recordings.readers.mtconnect import open_mtconnect
 from thermocomp.recordings.readers.parquet import open_parquet
 from thermocomp.recordings.readers.pivoting import pivot
 from thermocomp.recordings.readers.tables import FileTable
-from thermocomp.recordings.readers.textfile import open_csv
 from thermocomp.recordings.readers.workbook import open_workbook
 
 _TEXTS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
 _OPEN: dict[str, Callable[[Path, ReadOptions, FileLimits], FileTable]]
 _OPEN = {
-    **dict.fromkeys(_TEXTS, open_csv),
+    **dict.fromkeys(_TEXTS, open_text),
     ".xlsx": open_workbook,
     ".ods": open_workbook,
     ".parquet": open_parquet,

@@ -15,7 +15,6 @@ import pandas as pd
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.headings import is_understood
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
-from thermocomp.recordings.readers.labelled import find_delimiter, open_labelled
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
     FileLayout,
@@ -74,6 +73,8 @@ class CsvTable(FileTable):
         Line numbers (0-based) of lines that are not rows: headings, comments, blank lines.
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
+    short : bool
+        Rows may end before their last cells.
     embedded, decimal, notes
         See `thermocomp.recordings.readers.tables.FileTable`.
     """
@@ -85,6 +86,7 @@ class CsvTable(FileTable):
     skipped: tuple[int, ...]
     n_rows: int
     data: bytes | None = None
+    short: bool = False
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if the first rows have none."""
@@ -169,18 +171,16 @@ class CsvTable(FileTable):
             "skipinitialspace": True,
             "encoding": self.encoding,
             "encoding_errors": self.errors,
-            "chunksize": _CHUNK,
+            "chunksize": max(self.n_rows, 1) if self.short else _CHUNK,  # pandas counts the cells of the first chunk
             "keep_default_na": False,
             "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
         }
 
 
-def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
+def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     """Detect the format of a text file in a single pass over its lines, without storing them."""
     data, told = bring_to_utf8(path, limits)
     lines = open_lines(path, data, options, limits)
-    if labelled := find_delimiter(lines):
-        return open_labelled(lines, labelled)
     head = _read_head(lines)
     delimiter, layout, first = head.delimiter, head.layout, head.lines
     body = _scan(lines, head)
@@ -202,7 +202,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
         ]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
-    headings += [""] * (body.width - len(headings))
+    headings = [*headings, *[""] * (body.width - len(headings))][: body.width]
     check_headings(path, headings, body.n_rows, limits)
     if layout.units != layout.heading:
         number, text = first[layout.units]
@@ -221,6 +221,7 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable:
         decimal=options.decimal,
         encoding=encoding,
         errors="strict" if options.encoding else "replace",
+        short=body.short,
         skipped=tuple(sorted((*body.skipped, *remarks))),
         n_rows=body.n_rows - len(remarks),
         embedded=lines.embedded(),
@@ -250,6 +251,7 @@ class _Body(NamedTuple):
 
     skipped: list[int]  #: line numbers of lines that are not rows (0-based)
     width: int
+    short: bool  #: rows may end before their last cells
     n_rows: int
     odd: list[bytes]  #: lines that are not UTF-8
     again: list[int]  #: line numbers of repeated headings (1-based)
@@ -288,6 +290,7 @@ def _scan(lines: Lines, head: _Head) -> _Body:
     headers = {line for _, line in head.lines[head.layout.heading : head.layout.begin]}
     skipped, odd, again = list[int](), list[bytes](), list[int]()
     number, ragged, least = 0, list[tuple[int, int, bytes]](), _count_usual(head)
+    most = least
     width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
     top, plain, long = lines.options.heading - 1, delimiter != " ", lines.limits.cell_characters
     for number, line in lines.content(skipped):
@@ -302,6 +305,7 @@ def _scan(lines: Lines, head: _Head) -> _Body:
         cells = line.count(ending) + 1 if plain and b'"' not in line else count_cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
+        most = cells if most < cells <= width else most
         if not least <= cells <= width and len(ragged) <= _MOST_RAGGED:
             ragged.append((number, cells, line))
         if len(line) > long:
@@ -314,7 +318,8 @@ def _scan(lines: Lines, head: _Head) -> _Body:
     tail = lines.read_tail(1 + max(number, *skipped[-1:]), skipped)[-MOST_REMARKS:]
     return _Body(
         skipped=skipped,
-        width=width,
+        width=most if least < width else width,
+        short=least < width,
         n_rows=n_rows,
         odd=odd,
         again=again,
