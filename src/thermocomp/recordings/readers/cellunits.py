@@ -50,9 +50,9 @@ def _split(cell: str) -> tuple[str, str] | None:
     if not cell[:2].strip("+- \t")[:1].isdigit() or is_number_like(cell):
         return None
     found = _CELL.fullmatch(cell)
-    if found is None or not (is_unit(found["unit"]) or is_foreign_unit(found["unit"])):
+    if found is None or not is_number_like(found["number"]):
         return None
-    return found["number"], found["unit"]
+    return (found["number"], found["unit"]) if is_unit(found["unit"]) or is_foreign_unit(found["unit"]) else None
 
 
 def _in_unit(cell: str, unit: str) -> str:

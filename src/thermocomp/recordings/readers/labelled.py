@@ -19,7 +19,7 @@ from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import is_number_like
-from thermocomp.recordings.readers.series import Clock, Series, join_series, seconds_to_ns
+from thermocomp.recordings.readers.series import Readings, TimeScale, join_series, seconds_to_ns
 from thermocomp.recordings.readers.tables import FileTable, FrameTable
 from thermocomp.recordings.readers.textfile import open_csv
 from thermocomp.recordings.readers.textlines import Lines, is_utf8, open_lines, split_line
@@ -63,7 +63,10 @@ def open_text(path: Path, options: ReadOptions, limits: FileLimits) -> FileTable
     with path.open("rb") if data is None else BytesIO(data) as f:
         signs = (_SIGN.match(f.readline(_LONGEST)) for _ in range(_FIRST))
         delimiter = next((match[1].decode() for match in signs if match), "")
-    found = _open(open_lines(path, data, options, limits), delimiter) if delimiter else None
+    try:
+        found = _open(open_lines(path, data, options, limits), delimiter) if delimiter else None
+    except (ValueError, OverflowError) as e:  # damaged numbers and dates of the header
+        raise RecordingError(f"{path}: the header is damaged ({e}); export the file again") from e
     return open_csv(path, options, limits) if found is None else found
 
 
@@ -76,14 +79,15 @@ def _open(lines: Lines, delimiter: str) -> FrameTable | None:
     segments = _split([(n + 1, split_line(line.decode(encoding, "replace"), delimiter)) for n, line in content])
     if not segments:
         return None
-    found: dict[str, list[Series]] = {}
+    found: dict[str, list[Readings]] = {}
     for segment in segments:
         for series in _read(segment, path):
             found.setdefault(series.heading, []).append(series)
     parts = list(found.values())
     _refuse_restart(segments, parts[0] if parts else [], path)
     joined = [
-        Series(p[0].heading, np.concatenate([s.times for s in p]), np.concatenate([s.values for s in p])) for p in parts
+        Readings(p[0].heading, np.concatenate([s.times for s in p]), np.concatenate([s.values for s in p]))
+        for p in parts
     ]
     notes = [f"the file has {len(segments)} segments"] * (len(segments) > 1)
     scaled = [key for key in ("ScaleFactor", "Offset") for s in segments for k in s.header.get(key, [])[1:]
@@ -91,9 +95,9 @@ def _open(lines: Lines, delimiter: str) -> FrameTable | None:
     if scaled:
         notes.append(f"{' and '.join(dict.fromkeys(scaled))} of the display are not applied")
     decimal = segments[0].cell("Decimal_Separator", 1)
-    clock = Clock("timestamp", "UTC" if "Starttime of export" in segments[0].header else "naive")
+    clock = TimeScale("timestamp", "UTC" if "Starttime of export" in segments[0].header else "naive")
     dated = clock.zone == "UTC" or bool(segments[0].cell("Date", 1))
-    return join_series(path, joined, clock if dated else Clock(), limits, notes, decimal if decimal in ".," else "")
+    return join_series(path, joined, clock if dated else TimeScale(), limits, notes, decimal if decimal in ".," else "")
 
 
 def _split(rows: list[tuple[int, list[str]]]) -> list[_Segment]:
@@ -118,13 +122,13 @@ def _split(rows: list[tuple[int, list[str]]]) -> list[_Segment]:
     return segments
 
 
-def _read(segment: _Segment, path: Path) -> list[Series]:
+def _read(segment: _Segment, path: Path) -> list[Readings]:
     key = next(key for key in _NAMES if key in segment.header)
     names = [cell.strip() for cell in segment.header[key]]
     if (kind := segment.cell("X_Dimension", 1)) not in ("", "Time"):
         raise RecordingError(f"{path}: the rows are {kind.lower()}s, not times; a recording has rows at rising times")
     times = [k for k, name in enumerate(names) if name == key]
-    found: list[Series] = []
+    found: list[Readings] = []
     for k, name in enumerate(names):
         if k in times or not name or (name == "Comment" and k == len(names) - 1):
             continue
@@ -135,7 +139,7 @@ def _read(segment: _Segment, path: Path) -> list[Series]:
         heading = f"{name} [{unit}]" if unit and unit != "None" else name
         if any(s.heading == heading for s in found):
             heading = f"{_own(segment, 'SymbolName', k) or k} {heading}"
-        found.append(Series(heading, _begin(segment, k) + seconds_to_ns(time[good]), cells[good]))
+        found.append(Readings(heading, _begin(segment, k) + seconds_to_ns(time[good]), cells[good]))
     return found
 
 
@@ -147,14 +151,18 @@ def _own(segment: _Segment, key: str, column: int) -> str:
 def _times(segment: _Segment, column: int, channel: int) -> FloatArray:
     """Return the times of a channel [s], from their column or from the first instant and the interval."""
     said = segment.numbers(column)
+    said[np.abs(said) > 1e18] = np.nan  # beyond any clock
+    timed = bool(np.isfinite(said).any())
     if "SampleTime[ms]" in segment.header or "Starttime of export" in segment.header:
-        said = said - _WINDOWS if np.nanmax(said, initial=0) > _WINDOWS else said
-        if np.nanmax(said, initial=0) > _WINDOWS / 1e4:  # 100 ns since 1970
+        if not timed:
+            return said
+        said = said - _WINDOWS if float(np.nanmax(said)) > _WINDOWS else said
+        if float(np.nanmax(said)) > _WINDOWS / 1e4:  # 100 ns since 1970
             return np.asarray((said - _begin(segment, channel) / 100) * 1e-7, dtype=np.float64)
         every = segment.cell("SampleTime[ms]", channel).replace(",", ".")
         counted = is_number_like(every) and len(said) > 1 and float(np.nanmedian(np.diff(said))) == 1.0
         return np.asarray(said * (float(every) if counted else 1.0) * 1e-3, dtype=np.float64)
-    if np.isfinite(said).any():
+    if timed:
         return said
     start, step = (segment.cell(key, channel).replace(",", ".") for key in ("X0", "Delta_X"))
     return np.asarray(float(start or 0) + float(step or np.nan) * np.arange(len(said)), dtype=np.float64)
@@ -169,7 +177,7 @@ def _begin(segment: _Segment, column: int) -> int:
     return pd.Timestamp(f"{day} {clock}".strip()).value if day else 0
 
 
-def _refuse_restart(segments: list[_Segment], parts: list[Series], path: Path) -> None:
+def _refuse_restart(segments: list[_Segment], parts: list[Readings], path: Path) -> None:
     """Reject segments whose times start again: they are separate tests."""
     if any(a.times[-1] >= b.times[0] for a, b in pairwise(parts)):
         refuse_tests(str(path), [[s.lines[0], s.lines[-1]] for s in segments])

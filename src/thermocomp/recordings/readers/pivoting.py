@@ -18,7 +18,7 @@ from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, find_column_kin
 from thermocomp.recordings.readers.guesses import understand_or_none
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
-from thermocomp.recordings.readers.series import Clock, Series, join_series, seconds_to_ns
+from thermocomp.recordings.readers.series import Readings, TimeScale, join_series, seconds_to_ns
 from thermocomp.recordings.readers.stamps import AmbiguousDatesError, parse, parse_stamps
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import find_time
@@ -56,7 +56,7 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     if instants is None:
         return table
     times, zone, notes = instants
-    series, dropped = list[Series](), list[str]()
+    series, dropped = list[Readings](), list[str]()
     for label, rows in cells.groupby(labels.to_numpy(), sort=False).indices.items():
         part = cells.iloc[rows]
         texts = part[value].astype(str)
@@ -66,7 +66,7 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
             continue
         common = meanings[value]
         unit = _unit(part[units]) or (common.unit.symbol if common else "")
-        series.append(Series(_heading(str(label), unit), times[rows], texts.to_numpy(dtype=object)))
+        series.append(Readings(_heading(str(label), unit), times[rows], texts.to_numpy(dtype=object)))
     if not series:
         return table
     heads = [s.heading.partition(".")[2] for s in series]
@@ -75,7 +75,7 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     decimal = table.decimal or "." * (getattr(table, "delimiter", "") == ",")
     told = [*table.notes, *notes, f"a long table: {headings[value]!r} holds the values of {len(series)} channels"]
     told += [f"not read, holding no numbers: {', '.join(dropped)}"] * bool(dropped)
-    clock = Clock(headings[plan.time] if zone else "time_s", zone)
+    clock = TimeScale(headings[plan.time] if zone else "time_s", zone)
     return join_series(table.path, series, clock, mapping.limits, told, decimal)
 
 
@@ -132,8 +132,11 @@ def _instants(
     """Return the instants of readings [ns], their zone, and notes; None if they are no timestamps."""
     numbers = pd.to_numeric(shown, errors="coerce").to_numpy(dtype=np.float64)
     meaning = understand_or_none(heading)
-    if meaning is not None and meaning.unit.quantity == "time" and np.isfinite(numbers).all():
-        return seconds_to_ns(numbers * meaning.unit.scale), "", ()
+    if meaning is not None and meaning.unit.quantity == "time":
+        try:
+            return seconds_to_ns(numbers * meaning.unit.scale), "", ()
+        except ValueError:
+            return None
     for parts in PARTS:
         if np.isfinite(numbers).all() and EPOCH[0] * parts <= numbers.min() <= numbers.max() < EPOCH[1] * parts:
             return np.round(numbers * (1e9 / parts)).astype(np.int64), "UTC", (f"{heading!r} counts from 1970",)

@@ -16,10 +16,12 @@ from thermocomp.recordings.readers.tables import FrameTable, check_headings
 
 #: readings closer than this fraction of the usual interval of the densest series form one row
 _TOGETHER = 0.25
+#: a century [s]
+_LONGEST = 3.2e9
 
 
 @dataclass(frozen=True)
-class Series:
+class Readings:
     """Readings of one channel.
 
     Parameters
@@ -38,7 +40,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Clock:
+class TimeScale:
     """Meaning of the times of series: heading of their column, and zone (``naive`` without one, empty if relative)."""
 
     heading: str = "time_s"
@@ -53,7 +55,12 @@ class Clock:
 
 
 def join_series(
-    path: Path, series: Sequence[Series], clock: Clock, limits: FileLimits, notes: Sequence[str] = (), decimal: str = ""
+    path: Path,
+    series: Sequence[Readings],
+    clock: TimeScale,
+    limits: FileLimits,
+    notes: Sequence[str] = (),
+    decimal: str = "",
 ) -> FrameTable:
     """Return the table whose rows are the instants of all series.
 
@@ -78,25 +85,27 @@ def join_series(
 
 
 def seconds_to_ns(seconds: FloatArray) -> IntArray:
-    """Return times as whole nanoseconds."""
+    """Return times as whole nanoseconds; `ValueError` if they are too long."""
+    if not (np.abs(seconds) < _LONGEST).all():
+        raise ValueError("times of over a century")
     return np.round(seconds * 1e9).astype(np.int64)
 
 
-def _sorted(series: Series) -> Series:
+def _sorted(series: Readings) -> Readings:
     """Return a series in the order of time; of two values at one instant the last."""
     order = np.argsort(series.times, kind="stable")
     times = series.times[order]
     last = np.append(np.diff(times) > 0, True)
-    return Series(series.heading, times[last], series.values[order][last])
+    return Readings(series.heading, times[last], series.values[order][last])
 
 
-def _together(every: IntArray, series: Sequence[Series]) -> IntArray:
+def _together(every: IntArray, series: Sequence[Readings]) -> IntArray:
     steps = [float(np.median(np.diff(s.times))) for s in series if len(s.times) > 1]
     close = np.diff(every) < _TOGETHER * min(steps, default=0.0)
     return np.asarray(every[np.append(~close, True)])
 
 
-def _hold(series: Series, every: IntArray) -> NDArray[Any]:
+def _hold(series: Readings, every: IntArray) -> NDArray[Any]:
     at = np.searchsorted(series.times, every, side="right") - 1
     longest = int(np.diff(series.times).max()) if len(series.times) > 1 else 0
     there = (at >= 0) & (every - series.times[at] <= longest)
