@@ -33,6 +33,8 @@ _NAMES = ("X_Value", "Name")
 _UNITS = ("Y_Unit_Label", "Unit")
 #: remarks within a LabVIEW file
 _SPECIAL = ("***Start_Special***", "***End_Special***")
+#: larger numbers are not times, whatever the clock
+_FARTHEST = 1e18
 #: 1970 in the clock of Windows, which counts 100 ns from 1601
 _WINDOWS = 116_444_736_000_000_000
 
@@ -151,7 +153,7 @@ def _own(segment: _Segment, key: str, column: int) -> str:
 def _times(segment: _Segment, column: int, channel: int) -> FloatArray:
     """Return the times of a channel [s], from their column or from the first instant and the interval."""
     said = segment.numbers(column)
-    said[np.abs(said) > 1e18] = np.nan  # beyond any clock
+    said = np.where(np.abs(said) < _FARTHEST, said, np.nan)
     timed = bool(np.isfinite(said).any())
     if "SampleTime[ms]" in segment.header or "Starttime of export" in segment.header:
         if not timed:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -133,10 +134,8 @@ def _instants(
     numbers = pd.to_numeric(shown, errors="coerce").to_numpy(dtype=np.float64)
     meaning = understand_or_none(heading)
     if meaning is not None and meaning.unit.quantity == "time":
-        try:
+        with suppress(ValueError):
             return seconds_to_ns(numbers * meaning.unit.scale), "", ()
-        except ValueError:
-            return None
     for parts in PARTS:
         if np.isfinite(numbers).all() and EPOCH[0] * parts <= numbers.min() <= numbers.max() < EPOCH[1] * parts:
             return np.round(numbers * (1e9 / parts)).astype(np.int64), "UTC", (f"{heading!r} counts from 1970",)
@@ -155,9 +154,10 @@ def _instants(
                 [{"time": {"column": heading, "format": form}} for form in e.readings],
             ) from e
         if found is None:
-            return None
-        stamps, notes = found.stamps, found.notes
-        zone = (pd.Timestamp(found.start).tzinfo if found.start else None) or "naive"
+            stamps = pd.Series([pd.NaT])
+        else:
+            stamps = found.stamps
+            notes, zone = found.notes, (pd.Timestamp(found.start).tzinfo if found.start else None) or "naive"
     if stamps.isna().any():
         return None
     return stamps.to_numpy(dtype="M8[ns]").view(np.int64), zone, notes
