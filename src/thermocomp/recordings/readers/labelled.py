@@ -83,7 +83,7 @@ def _open(lines: Lines, delimiter: str) -> FrameTable | None:
         return None
     found: dict[str, list[Readings]] = {}
     for segment in segments:
-        for series in _read(segment, path):
+        for series in (s for s in _read(segment, path) if s.times.size):
             found.setdefault(series.heading, []).append(series)
     parts = list(found.values())
     _refuse_restart(segments, parts[0] if parts else [], path)
@@ -162,7 +162,8 @@ def _times(segment: _Segment, column: int, channel: int) -> FloatArray:
         if float(np.nanmax(said)) > _WINDOWS / 1e4:  # 100 ns since 1970
             return np.asarray((said - _begin(segment, channel) / 100) * 1e-7, dtype=np.float64)
         every = segment.cell("SampleTime[ms]", channel).replace(",", ".")
-        counted = is_number_like(every) and len(said) > 1 and float(np.nanmedian(np.diff(said))) == 1.0
+        steps = np.diff(said[np.isfinite(said)])
+        counted = is_number_like(every) and bool(steps.size) and float(np.median(steps)) == 1.0
         return np.asarray(said * (float(every) if counted else 1.0) * 1e-3, dtype=np.float64)
     if timed:
         return said
