@@ -19,7 +19,7 @@ from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import is_number_like
-from thermocomp.recordings.readers.series import Readings, TimeScale, join_series, seconds_to_ns
+from thermocomp.recordings.readers.series import TimeScale, TimeSeries, join_series, seconds_to_ns
 from thermocomp.recordings.readers.tables import FileTable, FrameTable
 from thermocomp.recordings.readers.textfile import open_csv
 from thermocomp.recordings.readers.textlines import Lines, is_utf8, open_lines, split_line
@@ -81,14 +81,14 @@ def _open(lines: Lines, delimiter: str) -> FrameTable | None:
     segments = _split([(n + 1, split_line(line.decode(encoding, "replace"), delimiter)) for n, line in content])
     if not segments:
         return None
-    found: dict[str, list[Readings]] = {}
+    found: dict[str, list[TimeSeries]] = {}
     for segment in segments:
         for series in (s for s in _read(segment, path) if s.times.size):
             found.setdefault(series.heading, []).append(series)
     parts = list(found.values())
     _refuse_restart(segments, parts[0] if parts else [], path)
     joined = [
-        Readings(p[0].heading, np.concatenate([s.times for s in p]), np.concatenate([s.values for s in p]))
+        TimeSeries(p[0].heading, np.concatenate([s.times for s in p]), np.concatenate([s.values for s in p]))
         for p in parts
     ]
     notes = [f"the file has {len(segments)} segments"] * (len(segments) > 1)
@@ -124,13 +124,13 @@ def _split(rows: list[tuple[int, list[str]]]) -> list[_Segment]:
     return segments
 
 
-def _read(segment: _Segment, path: Path) -> list[Readings]:
+def _read(segment: _Segment, path: Path) -> list[TimeSeries]:
     key = next(key for key in _NAMES if key in segment.header)
     names = [cell.strip() for cell in segment.header[key]]
     if (kind := segment.cell("X_Dimension", 1)) not in ("", "Time"):
         raise RecordingError(f"{path}: the rows are {kind.lower()}s, not times; a recording has rows at rising times")
     times = [k for k, name in enumerate(names) if name == key]
-    found: list[Readings] = []
+    found: list[TimeSeries] = []
     for k, name in enumerate(names):
         if k in times or not name or (name == "Comment" and k == len(names) - 1):
             continue
@@ -141,7 +141,7 @@ def _read(segment: _Segment, path: Path) -> list[Readings]:
         heading = f"{name} [{unit}]" if unit and unit != "None" else name
         if any(s.heading == heading for s in found):
             heading = f"{_own(segment, 'SymbolName', k) or k} {heading}"
-        found.append(Readings(heading, _begin(segment, k) + seconds_to_ns(time[good]), cells[good]))
+        found.append(TimeSeries(heading, _begin(segment, k) + seconds_to_ns(time[good]), cells[good]))
     return found
 
 
@@ -180,7 +180,7 @@ def _begin(segment: _Segment, column: int) -> int:
     return pd.Timestamp(f"{day} {clock}".strip()).value if day else 0
 
 
-def _refuse_restart(segments: list[_Segment], parts: list[Readings], path: Path) -> None:
+def _refuse_restart(segments: list[_Segment], parts: list[TimeSeries], path: Path) -> None:
     """Reject segments whose times start again: they are separate tests."""
     if any(a.times[-1] >= b.times[0] for a, b in pairwise(parts)):
         refuse_tests(str(path), [[s.lines[0], s.lines[-1]] for s in segments])

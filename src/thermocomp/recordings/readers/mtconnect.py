@@ -9,7 +9,7 @@ import pandas as pd
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
-from thermocomp.recordings.readers.series import Readings, TimeScale, join_series
+from thermocomp.recordings.readers.series import TimeScale, TimeSeries, join_series
 from thermocomp.recordings.readers.tables import FrameTable
 
 #: units of the standard, by the type of a sample
@@ -49,5 +49,5 @@ def open_mtconnect(path: Path, options: ReadOptions, limits: FileLimits) -> Fram
         stamps = pd.to_datetime(pd.Series([t for t, _ in readings]), format="ISO8601", utc=True, errors="coerce")
         good = stamps.notna().to_numpy()
         values = np.array([value for _, value in readings], dtype=object)
-        series.append(Readings(heading, stamps[good].to_numpy(dtype="M8[ns]").view(np.int64), values[good]))
+        series.append(TimeSeries(heading, stamps[good].to_numpy(dtype="M8[ns]").view(np.int64), values[good]))
     return join_series(path, series, TimeScale("timestamp", "UTC"), limits, decimal=options.decimal or ".")

@@ -19,7 +19,7 @@ from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, find_column_kin
 from thermocomp.recordings.readers.guesses import understand_or_none
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
-from thermocomp.recordings.readers.series import Readings, TimeScale, join_series, seconds_to_ns
+from thermocomp.recordings.readers.series import TimeScale, TimeSeries, join_series, seconds_to_ns
 from thermocomp.recordings.readers.stamps import AmbiguousDatesError, parse, parse_stamps
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import find_time
@@ -57,7 +57,7 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     if instants is None:
         return table
     times, zone, notes = instants
-    series, dropped = list[Readings](), list[str]()
+    series, dropped = list[TimeSeries](), list[str]()
     for label, rows in cells.groupby(labels.to_numpy(), sort=False).indices.items():
         part = cells.iloc[rows]
         texts = part[value].astype(str)
@@ -67,7 +67,7 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
             continue
         common = meanings[value]
         unit = _unit(part[units]) or (common.unit.symbol if common else "")
-        series.append(Readings(_heading(str(label), unit), times[rows], texts.to_numpy(dtype=object)))
+        series.append(TimeSeries(_heading(str(label), unit), times[rows], texts.to_numpy(dtype=object)))
     if not series:
         return table
     heads = [s.heading.partition(".")[2] for s in series]

@@ -14,14 +14,14 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.tables import FrameTable, check_headings
 
-#: readings closer than this fraction of the usual interval of the densest series form one row
+#: readings closer than this fraction of the shortest interval of any series form one row
 _TOGETHER = 0.25
 #: a century [s]
 _LONGEST = 3.2e9
 
 
 @dataclass(frozen=True)
-class Readings:
+class TimeSeries:
     """Readings of one channel.
 
     Parameters
@@ -56,7 +56,7 @@ class TimeScale:
 
 def join_series(
     path: Path,
-    series: Sequence[Readings],
+    series: Sequence[TimeSeries],
     clock: TimeScale,
     limits: FileLimits,
     notes: Sequence[str] = (),
@@ -91,21 +91,21 @@ def seconds_to_ns(seconds: FloatArray) -> IntArray:
     return np.round(seconds * 1e9).astype(np.int64)
 
 
-def _sorted(series: Readings) -> Readings:
+def _sorted(series: TimeSeries) -> TimeSeries:
     """Return a series in the order of time; of two values at one instant the last."""
     order = np.argsort(series.times, kind="stable")
     times = series.times[order]
     last = np.append(np.diff(times) > 0, True)
-    return Readings(series.heading, times[last], series.values[order][last])
+    return TimeSeries(series.heading, times[last], series.values[order][last])
 
 
-def _together(every: IntArray, series: Sequence[Readings]) -> IntArray:
-    steps = [float(np.median(np.diff(s.times))) for s in series if len(s.times) > 1]
-    close = np.diff(every) < _TOGETHER * min(steps, default=0.0)
+def _together(every: IntArray, series: Sequence[TimeSeries]) -> IntArray:
+    shortest = min((int(np.diff(s.times).min()) for s in series if len(s.times) > 1), default=0)
+    close = np.diff(every) < _TOGETHER * shortest
     return np.asarray(every[np.append(~close, True)])
 
 
-def _hold(series: Readings, every: IntArray) -> NDArray[Any]:
+def _hold(series: TimeSeries, every: IntArray) -> NDArray[Any]:
     at = np.searchsorted(series.times, every, side="right") - 1
     longest = int(np.diff(series.times).max()) if len(series.times) > 1 else 0
     there = (at >= 0) & (every - series.times[at] <= longest)
