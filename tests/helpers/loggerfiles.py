@@ -40,6 +40,16 @@ def keysight() -> str:
     )
 
 
+def padded(begin: int = 0, end: int = N) -> str:
+    """Return such a scan from a spreadsheet, which ends the rows of the list with empty cells."""
+    channels = "".join(f"{number},{name},,,,\n" for number, name in ((101, "Spindle"), (102, "Probe"), (103, "Spare")))
+    rows = "".join(f"{k + 1},{us(k)},{t},0,{z},0\n" for k, t, z in ROWS[begin:end])
+    return (
+        f"Name:,Warm-up,,,,\nChannel,Name,,,,\n{channels},,,,,\nScan Control:,,,,,\n"
+        f"Scan,Time,101 [C],Alarm 101,102 [um],Alarm 102\n{rows}"
+    )
+
+
 def graphtec(begin: int = 0, end: int = N) -> str:
     """Return a file of a midi logger, with a list of its channels and a second row of headings."""
     return (
@@ -180,6 +190,8 @@ def words() -> str:
 #: file name, and its content
 FILES: dict[str, Callable[[], str]] = {
     "keysight.csv": keysight,
+    "padded.csv": padded,
+    "continued.csv": lambda: padded(0, 60) + padded(60),
     "graphtec.csv": graphtec,
     "restarted.csv": lambda: graphtec(0, 60) + graphtec(60),
     "yokogawa.csv": yokogawa,

@@ -19,7 +19,7 @@ from thermocomp.recordings.starts import find_starts, find_zeroing
 BEGIN = "2024-03-05T08:00:00"
 #: files with another begin, or other names; the names of the others are Spindle_C and Probe_um
 BEGINS = {
-    "keysight.csv": "2024-03-13T08:00:00.010000",
+    **dict.fromkeys(("keysight.csv", "padded.csv", "continued.csv"), "2024-03-13T08:00:00.010000"),
     "twincat.csv": f"{BEGIN}+00:00",
     "history.csv": "2024-03-05T08:00:00.700000+00:00",
     "influx.csv": f"{BEGIN}+00:00",
@@ -49,6 +49,7 @@ def test_it_is_read_at_once_with_names_units_and_times(tmp_path: Path, name: str
     assert [c.name for c in recording.channels] == NAMES.get(name, ["Spindle_C", "Probe_um"])
     assert recording.start == BEGINS.get(name, BEGIN)
     assert np.allclose(recording.time, STEP * np.arange(N))
+    assert any("different times" in note for note in recording.notes) is (name in ("twincat.csv", "history.csv"))
     spindle, probe = values(recording)
     good = np.isfinite(spindle)
     assert np.allclose(spindle[good], np.array(SPINDLE)[good])
