@@ -10,7 +10,7 @@ import pandas as pd
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.units import HOUSE_UNITS
-from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, understand
+from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, is_time_name, understand
 from thermocomp.recordings.readers.dayforms import find_day_columns
 from thermocomp.recordings.readers.leftout import find_electric_unit, tell_sensitivity
 from thermocomp.recordings.readers.mapping import Mapping
@@ -149,7 +149,8 @@ def _role(heading: str, values: FloatArray) -> tuple[str, str]:
 
 def _guess_times(table: FileTable, mapping: Mapping) -> list[dict[str, Any]]:
     """Return the first column that always increases, in its likely units, or contains dates, unless one is named."""
-    if mapping.time.column or any(_names_time(h) for h in table.headings):
+    dated = any(is_time_name(h) and not table.is_number(k) for k, h in enumerate(table.headings))
+    if mapping.time.column or dated or any(_names_time(h) for h in table.headings):
         return []
     for k, heading in enumerate(table.headings):
         if not heading:

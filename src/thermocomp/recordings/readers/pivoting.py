@@ -40,10 +40,13 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     if value is None or not ids:
         return table
     meanings = [understand_or_none(h) for h in headings]
+    kinds = cache(partial(find_column_kind, table))
     try:
-        plan = find_time(table, meanings, mapping, cache(partial(find_column_kind, table)))
+        plan = find_time(table, meanings, mapping, kinds)
     except InputError:
         return table
+    if kinds(plan.time) == "number" and not mapping.time.column:  # dates are surer than Time_ms of unknown origin
+        plan = plan._replace(time=next((k for k in range(len(headings)) if kinds(k) == "stamp"), plan.time))
     wanted = dict.fromkeys(k for k in (plan.time, plan.date, value, *ids, *units) if k is not None)
     cells = table.load([], list(wanted))[0].astype(object)
     cells = cells[cells[plan.time].notna() & cells[value].notna()]
