@@ -1,6 +1,7 @@
 """Initial thermal state of a test: cold, continued from an earlier file, re-zeroed on a warm machine, or known zero."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
@@ -175,8 +176,10 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
 
 
 def find_zeroing(recording: Recording) -> Zeroing:
-    """Return the usual averaging times of the zero, with the spindle speed of a recording."""
-    return Zeroing(speed=recording.speed.name if recording.speed is not None else "")
+    """Return the usual averaging times of the zero, with the spindle speed of a recording if a model can name it."""
+    with suppress(InputError):
+        return Zeroing(speed=recording.speed.name if recording.speed is not None else "")
+    return Zeroing()
 
 
 def turns(recording: Recording, zeroing: Zeroing) -> bool:
