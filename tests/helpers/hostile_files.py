@@ -14,6 +14,7 @@ import openpyxl
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from loggerfiles import FILES
 
 from thermocomp.core.exceptions import ThermocompError
 from thermocomp.recordings.checks.quality import check
@@ -91,7 +92,7 @@ def _unzip(content: bytes) -> dict[str, bytes]:
 
 
 def bases() -> dict[str, bytes]:
-    """Return a sound recording by its ending."""
+    """Return a sound recording by its ending, or by the name of a logger's file."""
     whole = table()
     out: dict[str, bytes] = {}
     for ending in ("xlsx", "parquet"):
@@ -105,6 +106,7 @@ def bases() -> dict[str, bytes]:
         "txt": whole.to_csv(index=False, sep=";", decimal=",").encode("utf-8-sig"),
         "tsv": whole.to_csv(index=False, sep="\t").encode("latin-1"),
         "ods": _ods("".join(map(_ods_row, rows))),
+        **{name: make().encode() for name, make in FILES.items()},
     }
 
 
@@ -324,7 +326,7 @@ def damaged(seed: int, sound: dict[str, bytes]) -> tuple[str, bytes]:
         name = rng.choice(sorted(parts))
         parts[name] = _hurt(parts[name], rng) if rng.random() < 0.3 else _reword(parts[name], rng)
         return ending, _zip({**parts})
-    if ending in ("csv", "tsv", "txt") and rng.random() < 0.7:
+    if ending.rpartition(".")[2] in ("csv", "tsv", "txt", "lvm", "xml") and rng.random() < 0.7:
         return ending, _reword(content, rng)
     return ending, _hurt(content, rng)
 

@@ -98,8 +98,8 @@ def test_the_line_of_the_headings_can_be_stated(tmp_path: Path) -> None:
 
 def test_a_wrong_row_is_told_behind_a_preamble_too(tmp_path: Path) -> None:
     path = tmp_path / "habit.csv"
-    path.write_text(HABITS["preamble and a row of units"].replace("20,4;", "warm;"), encoding="utf-8")
-    with pytest.raises(RecordingError, match=r"line 7, column 'T1 \[°C\]': 'warm' is not a number"):
+    path.write_text(HABITS["preamble and a row of units"].replace("20,4;", "2O,4;"), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"line 7, column 'T1 \[°C\]': '2O,4' is not a number"):
         read(path)
 
 

@@ -24,6 +24,9 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             "written in UTF-16-LE",
             "lines 1 to 16 above the headings are skipped",
+            "the header names: '201 <Spindle> (rpm)' is 'Spindle [rpm]', '101 <T1> (C)' is 'T1 [C]', "
+            "'102 <T2> (C)' is 'T2 [C]', '103 <T3> (C)' is 'T3 [C]', '202 <Z> (um)' is 'Z [um]', "
+            "'203 <Y> (um)' is 'Y [um]'",
             "the dates are month/day/year: '05/27/2024 08:00:00.000' is not a date otherwise",
         ),
     ),
@@ -45,9 +48,11 @@ AT_ONCE: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             "lines 1 to 17 above the headings are skipped",
             "line 19 holds the units",
-            "CH2 [degC]: 'BURNOUT', taken as missing, in 2 of 48 cells: line 27, line 28",
-            "CH4 [degC]: 'BURNOUT', taken as missing, in 1 of 48 cells: line 40",
-            "CH5 [um]: '+++++++', taken as missing, in 1 of 48 cells: line 51",
+            "the header names: 'CH1 [rpm]' is 'Spindle [rpm]', 'CH2 [degC]' is 'Front [degC]', 'CH3 [degC]' is "
+            "'Rear [degC]', 'CH4 [degC]' is 'Air [degC]', 'CH5 [um]' is 'Z [um]', 'CH6 [um]' is 'Y [um]'",
+            "Front [degC]: 'BURNOUT', taken as missing, in 2 of 48 cells: line 27, line 28",
+            "Air [degC]: 'BURNOUT', taken as missing, in 1 of 48 cells: line 40",
+            "Z [um]: '+++++++', taken as missing, in 1 of 48 cells: line 51",
         ),
     ),
     "picolog.csv": ("full", BEGIN + "+02:00", ("column 1 has no heading and holds dates: taken as the time",)),

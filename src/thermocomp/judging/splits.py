@@ -171,7 +171,8 @@ def leave_one_day_out(samples: Samples) -> Judging:
     names, day = np.unique(days, return_inverse=True)
     blocks = join_short_cycles(np.where(own, day, -1), np.zeros(len(samples), dtype=np.intp))
     if len(blocks) < 2:
-        raise InputError("leaving one day out needs at least two days with recordings")
+        few = f"found {len(names)}" + f", of which one has at least {MIN_ROWS} rows" * (len(names) > 1)
+        raise InputError(f"leaving one day out needs at least two days with {MIN_ROWS} rows each, {few}")
     splits = []
     for block in blocks:
         mine = np.isin(day, block) & own

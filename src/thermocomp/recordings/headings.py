@@ -38,8 +38,8 @@ _AXIS = re.compile(r"[xyzuvw]\d?")
 _TURNING = ("spindle", "speed", "spindel", "drehzahl", "broche", "mandrin", "husillo", "mandrino")
 #: names that define the quantity, whatever the unit
 _NAMES = {
-    "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "temperature": re.compile(r"t\d+|tc ?\d+|.*\btemp(?:\b|[ _.\d]|er).*|.*temperatur.*"),
+    "spindle_speed": re.compile(rf".*(?:{'|'.join(_TURNING)}).*"),
     "displacement": re.compile(
         r".*(?:drift|displacement|verlagerung|verschiebung|abweichung|deviation|déplacement).*|weg ?\w?"
     ),
@@ -51,6 +51,8 @@ _DIFFERENCE = re.compile(
 )
 #: headings of a time column, without their unit, in several languages
 _TIMES = frozenset(read_words("times"))
+#: words of a length that is not a position, although its name contains one
+_ERRORS = frozenset(read_words("errors"))
 #: letters of a date or time in a heading, such as hh:mm:ss and TT.MM.JJJJ
 _FORMAT = re.compile(r"(?i)[dtgmyjahsf]{1,4}(?:[^a-zäöü]+[dtgmyjahsfp]{1,4})+")
 #: a date in the format of a timestamp, with the T before the hours
@@ -113,7 +115,9 @@ def understand(heading: str) -> Meaning | None:
 def _kind_of_length(base: str, symbol: str) -> str:
     """Return the quantity of a column with a unit of length: a displacement, a position and so on, by its name."""
     words = re.split(r"[\s_.-]+", base.casefold())
-    if any(w in ("pos", "position") for w in words) or (symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)):
+    measured = any(w in _ERRORS for w in words)  # the error of a position is a displacement
+    named = any(w in ("pos", "position") for w in words) and not measured
+    if named or (symbol == "mm" and all(_AXIS.fullmatch(w) for w in words)):
         return "position"
     return next((w for w in words if w in ("residual", "correction")), "displacement")
 

@@ -1,6 +1,7 @@
 """Initial thermal state of a test: cold, continued from an earlier file, re-zeroed on a warm machine, or known zero."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import pairwise
@@ -174,6 +175,25 @@ def find_resting_rows(recording: Recording, zeroing: Zeroing) -> BoolArray:
     return np.array([zeroing.stands(v) for v in recording.table[speed.name].tolist()], dtype=np.bool_)
 
 
+def find_zeroing(recording: Recording) -> Zeroing:
+    """Return the usual averaging times of the zero, with the spindle speed of a recording if a model can name it."""
+    with suppress(InputError):
+        return Zeroing(speed=recording.speed.name if recording.speed is not None else "")
+    return Zeroing()
+
+
+def turns(recording: Recording, zeroing: Zeroing) -> bool:
+    """Return whether the spindle is known to turn in the first row."""
+    name = recording.aliases.get(zeroing.speed, zeroing.speed)
+    known = name in recording.table.columns and bool(np.isfinite(recording.table[name].iloc[0]))
+    return known and not find_resting_rows(recording, zeroing)[0]
+
+
+def is_far(recording: Recording, name: str, zeroing: Zeroing) -> bool:
+    """Return whether a displacement does not start near zero: see `NEAR`, `SHARE` and `LOUD`."""
+    return abs(level(recording, name, zeroing)) > _tolerance(recording, name)
+
+
 def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = False) -> float:
     """Return the value of a channel at its start (mean over its first rows) or at its end (last row)."""
     values = recording.table[recording.channel(name).name].to_numpy(dtype=np.float64)
@@ -188,14 +208,15 @@ def level(recording: Recording, name: str, zeroing: Zeroing, *, end: bool = Fals
 
 def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[Channel], zeroing: Zeroing) -> Start:
     levels = {c.name: level(recording, c.name, zeroing) for c in targets}
-    far = {c.name: c for c in targets if abs(levels[c.name]) > _tolerance(recording, c.name)}
+    far = {c.name: c for c in targets if is_far(recording, c.name, zeroing)}
     before = next((o for o in others if 0 < (_between(o, recording) or 0.0) <= _soon(o)), None)
     if not far:
         if before is not None and any(
             abs(level(before, c.name, zeroing, end=True)) > _tolerance(before, c.name) for c in targets
         ):
             return Start("rezeroed", f"it follows {before.name} by its time stamps, and begins near zero again")
-        return Start("cold", "assumed, since the displacements begin near zero")
+        turning = ", although the spindle turns in the first row" * turns(recording, zeroing)
+        return Start("cold", f"assumed, since the displacements begin near zero{turning}")
     if before is not None and all(
         abs(level(before, n, zeroing, end=True) - levels[n]) <= max(_tolerance(recording, n), _tolerance(before, n))
         for n in far

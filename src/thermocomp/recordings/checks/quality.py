@@ -37,6 +37,8 @@ CODES = (-9999.0, -999.0, 9999.0, 99999.0, -99999.0, -32768.0, 32767.0, 1e30, -1
 TEMPERATURE_CODES = (-180.0, -273.15, -200.0, -127.0, 85.0, 850.0)
 #: plausible range on a machine tool [degC], [um], [urad]; wide for angles, which may be rotary axis positions
 PLAUSIBLE = {"temperature": (-60.0, 400.0), "displacement": (-1e5, 1e5), "angle": (-1e9, 1e9)}
+#: fewest intervals that resampling may leave
+_FEWEST = 20
 #: quantities whose sensor noise prevents constant values; a spindle speed or a position may be constant
 _SENSED = ("temperature", "displacement", "angle")
 
@@ -65,6 +67,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         signal, mine = _channel(channel, values, time, moved, probed=channel.name in probed)
         found += mine
         signals.append(signal)
+    found += suspects.zeros(recording, [s for s in signals if s.channel.quantity in ("displacement", "angle")])
     found += _together(signals, time, moved, speed)
     if not recording.start:  # times from stamps have no unit
         found += time_unit(time, [s for s in signals if s.channel.quantity == "temperature"], recording.time_unit)
@@ -105,7 +108,6 @@ def _together(
     of = {q: [s for s in signals if s.channel.quantity == q and s.good.any()] for q in _SENSED}
     yield from suspects.temperature_units(of["temperature"])
     yield from suspects.displacement_units(of["displacement"], of["temperature"])
-    yield from suspects.zeros([*of["displacement"], *of["angle"]], time)
     whole = [s for s in signals if not s.probed and s.channel.quantity in _SENSED]
     leaps = list(jumps(whole, time, moved))
     yield from leaps
@@ -219,7 +221,8 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
             "constant interval"
         )
         # long enough for a row in every interval
-        even = {"clean": [{"do": "resample", "every_s": float(np.ceil(kept.max()))}]}
+        every = float(np.ceil(kept.max()))
+        even = {"clean": [{"do": "resample", "every_s": every}]} if time[-1] - time[0] >= _FEWEST * every else None
         yield Finding("warning", "", "irregular sampling", text, remedy=even)
 
 

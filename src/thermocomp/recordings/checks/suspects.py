@@ -4,8 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from thermocomp.core.arrays import FloatArray
 from thermocomp.recordings.checks.findings import Finding, Severity, Signal, column
+from thermocomp.recordings.recording import Recording
+from thermocomp.recordings.starts import NEAR, find_zeroing, is_far, level, turns
 
 _ABSOLUTE = 273.15
 
@@ -101,30 +102,28 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
 
 
-def zeros(signals: Sequence[Signal], time: FloatArray) -> Iterator[Finding]:
+def zeros(recording: Recording, signals: Sequence[Signal]) -> Iterator[Finding]:
     """Yield findings on displacements and tilts with an offset at the start: continued recording, or probe not zeroed.
 
-    The start is the value nearest to 0 of the first value and the median of the first three. It is reported if it
-    exceeds 2 um or 2 urad, 5 % of the span and 6 times the noise. This is a warning: the numbers are valid, but models
-    are relative to zero.
-
-    Parameters
-    ----------
-    time : ndarray of shape (n_rows,)
-        [s]
+    `thermocomp.recordings.starts.is_far` judges it, as for a model. This is a warning: the numbers are valid, but
+    models are relative to zero. So is a spindle that turns in the first row if a displacement has moved by then.
     """
+    zeroing = find_zeroing(recording)
+    moved = [s.channel.name for s in signals if abs(level(recording, s.channel.name, zeroing)) > NEAR]
+    if moved and turns(recording, zeroing):
+        text = (
+            f"turns in the first row, where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved: "
+            "the zero was not taken at rest; record from the standstill on, or state what went before with --start"
+        )
+        yield Finding("warning", zeroing.speed, "turning start", text, row=0)
     for s in signals:
-        x = s.x
-        if len(x) < 3 or np.ptp(x) == 0:
-            continue
-        start = min(float(x[0]), float(np.median(x[:3])), key=abs)
-        if abs(start) > max(2.0, 0.05 * s.span, 6 * s.noise):
-            unit = s.channel.unit
+        if len(s.x) >= 3 and np.ptp(s.x) and is_far(recording, s.channel.name, zeroing):
+            unit, start = s.channel.unit, level(recording, s.channel.name, zeroing)
             text = (
                 f"starts at {start:.3g} {unit}, not near zero; models assume a probe zeroed at the start. If the "
                 "test continues another one, join the two files; otherwise take its first value as zero, in a "
                 'mapping: zero = "first"'
             )
             row = int(s.rows[0])
-            zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(time[row]), "to": 0.0}
+            zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(recording.time[row]), "to": 0.0}
             yield Finding("warning", s.channel.name, "not zeroed", text, row=row, remedy={"clean": [zeroed]})

@@ -58,11 +58,11 @@ class PlannedColumn:
 
     @np.errstate(over="ignore", invalid="ignore")
     def convert(
-        self, raw: FloatArray, missing: Sequence[float], place: Callable[[int], str]
+        self, raw: FloatArray, missing: Sequence[float | str], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """Return the values in the house unit, NaN where missing, and notes on replaced values and their rows."""
         notes = []
-        codes = np.array([*self.rule.missing, *missing])
+        codes = np.array([code for code in (*self.rule.missing, *missing) if not isinstance(code, str)])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
         if absent.any():
             found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))

@@ -10,8 +10,9 @@ import pandas as pd
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, Remedy, UnitError
 from thermocomp.core.units import HOUSE_UNITS
-from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, understand
+from thermocomp.recordings.headings import HOUSE_SUFFIX, Meaning, is_time_name, understand
 from thermocomp.recordings.readers.dayforms import find_day_columns
+from thermocomp.recordings.readers.leftout import find_electric_unit, tell_sensitivity
 from thermocomp.recordings.readers.mapping import Mapping
 from thermocomp.recordings.readers.tables import FileTable
 from thermocomp.recordings.readers.timecolumns import find_parts
@@ -24,7 +25,7 @@ _TEMPERATURE = re.compile(
     r"t\d*|tc\d*|pt\d+\w*|rtd\d*|ntc\d*|temp\w*|thermo\w*|lager|bearing|motor|ambient|umgebung|raum|room|air|luft|"
     r"coolant|k[uü]hl\w*|[oö]l|oil|housing|geh[aä]use|flansch|flange|nose|bett|bed|column|st[aä]nder|chamber"
 )
-_SPEED = re.compile(r"n|rpm|drehzahl|speed|spindle|spindel|spindeldrehzahl|broche|vitesse|velocidad")
+_SPEED = re.compile(r"n|s|rpm|drehzahl|speed|spindle|spindel|spindeldrehzahl|broche|vitesse|velocidad")
 _DISPLACEMENT = re.compile(
     r"d?[xyz]\d*|drift|disp\w*|displacement|weg\d*|verlagerung|taster\d*|probe\d*|error|fehler|abweichung|deviation|"
     r"deformation|lvdt\d*|eddy\d*|dial\d*|uhr\d*"
@@ -70,11 +71,15 @@ def guess_columns(table: FileTable, mapping: Mapping) -> list[tuple[str, list[Re
     for k, values in _numbers(table, unknown[:MOST_GUESSES]).items():
         heading = table.headings[k]
         place = heading if table.headings.count(heading) == 1 else k + 1
+        shown = ", ".join(f"{v:g}" for v in values[np.isfinite(values)][:3])
+        if unit := find_electric_unit(heading):  # its sensitivity is not known
+            text = f"{heading!r} ({shown} ...) is in {unit}: {tell_sensitivity(unit)}"
+            found.append((text, [_table(heading, k, place, "", "")]))
+            continue
         best = _role(heading, values)
         others = [(role, HOUSE_UNITS[role]) for role in _ROLES if role != best[0]] + [("", "")] * bool(best[0])
-        shown = ", ".join(f"{v:g}" for v in values[np.isfinite(values)][:3])
         ways = [_table(heading, k, place, role, unit) for role, unit in (best, *others)]
-        found.append((f"{heading!r} ({shown} ...)", ways))
+        found.append((f"{heading!r} ({shown} ...) has no known unit", ways))
     return found
 
 
@@ -144,7 +149,8 @@ def _role(heading: str, values: FloatArray) -> tuple[str, str]:
 
 def _guess_times(table: FileTable, mapping: Mapping) -> list[dict[str, Any]]:
     """Return the first column that always increases, in its likely units, or contains dates, unless one is named."""
-    if mapping.time.column or any(_names_time(h) for h in table.headings):
+    dated = any(is_time_name(h) and not table.is_number(k) for k, h in enumerate(table.headings))
+    if mapping.time.column or dated or any(_names_time(h) for h in table.headings):
         return []
     for k, heading in enumerate(table.headings):
         if not heading:

@@ -20,6 +20,7 @@ from thermocomp.recordings.headings import (
     is_understood,
     understand,
 )
+from thermocomp.recordings.readers.cellunits import has_unit
 from thermocomp.recordings.readers.numbers import is_filler, is_number_like
 from thermocomp.recordings.words import read_words
 
@@ -56,8 +57,9 @@ class FileLayout(NamedTuple):
 def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     """Find the headings of a table, its units, and its first row.
 
-    Above the first row of numbers there are rows of text. The headings are the first of those that name the largest
-    number of numeric columns; a row of units is recognised by its units.
+    Above the longest block of rows of numbers there are rows of text. The headings are the first of those that name the
+    largest number of numeric columns; a row of units is recognised by its units. A list of channels above the table, as
+    some loggers write it, is a shorter block whose rows have words where the table has times.
 
     Returns
     -------
@@ -69,7 +71,8 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
     # any preamble ends before the second half of the rows
     later = rows[len(rows) // 2 :]
     width, columns = find_columns(later)
-    numbers = [k for k in columns if _holds_numbers(later, k)]
+    timed = find_timed(later)
+    numbers = [k for k in columns if k not in timed]
     units_at = cache(lambda k: _is_units(rows[k], numbers))  # evaluated only as needed, because files may be wide
 
     def labels(k: int) -> bool:
@@ -77,7 +80,7 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
         return k + 1 < len(rows) and units_at(k + 1)
 
     for begin in range(1, len(rows)):
-        if not _is_row(rows[begin], columns) or labels(begin):
+        if not is_row(rows[begin], columns, timed) or labels(begin):
             continue
         first = begin
         while first and begin - first < _MOST_BETWEEN:
@@ -101,8 +104,16 @@ def find_layout(rows: Sequence[Sequence[str]]) -> FileLayout | None:
             # without known headings the first complete row; with two columns the last one, after the preamble
             order = 1 if width == 2 else -1
             heading = known[0] if known else max(names, key=lambda k: (_count_filled(rows[k], columns), order * k))
+            if not _names_time(rows[heading]) and _has_longer_block(rows, begin):
+                continue
             return FileLayout(heading, units[-1] if units else heading, begin)
     return None
+
+
+def _has_longer_block(rows: Sequence[Sequence[str]], begin: int) -> bool:
+    """Return whether headings with a time follow, with more rows below them than above them since `begin`."""
+    below = range(begin + 1, (len(rows) + begin) // 2)
+    return any(_names_time(rows[k]) and _is_heading(rows[k]) for k in below)
 
 
 def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> int:
@@ -116,6 +127,11 @@ def find_end(first: Sequence[Sequence[str]], last: Sequence[Sequence[str]]) -> i
             break
         count += 1
     return count
+
+
+def find_rest(rows: Sequence[Sequence[str]], layout: FileLayout) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of text around the headings: a preamble, a list of channels, a row of names."""
+    return tuple(tuple(row) for k, row in enumerate(rows[: layout.begin]) if k not in (layout.heading, layout.units))
 
 
 def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[str, ...]:
@@ -231,6 +247,11 @@ def find_columns(rows: Sequence[Sequence[str]]) -> tuple[int, list[int]]:
     return width, [k for k in range(width) if 2 * values[k] >= len(even) and values[k]]
 
 
+def find_timed(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return the columns with dates or times of day in most rows."""
+    return [k for k in find_columns(rows)[1] if not _holds_numbers(rows, k)]
+
+
 def _is_text(row: Sequence[str], width: int) -> bool:
     # a logger may end its rows, but not its headings, with a delimiter
     return len(row) in (width, width - 1) and any(cell.strip() for cell in row)
@@ -241,10 +262,12 @@ def _is_heading(row: Sequence[str]) -> bool:
     return len(filled) >= min(2, len(row)) and not any(map(_is_value, filled))
 
 
-def _is_row(row: Sequence[str], columns: Sequence[int]) -> bool:
+def is_row(row: Sequence[str], columns: Sequence[int], timed: Sequence[int]) -> bool:
+    """Return whether a row has values in most of some columns, and no words in those that hold dates and times."""
     values = {k: _is_value(row[k]) for k in columns if k < len(row)}
     full = [k for k, is_value in values.items() if is_value or is_filler(row[k])]
-    return any(values.values()) and full[0] == columns[0] and len(full) > _ROW * len(columns)
+    worded = any(k < len(row) and not values[k] and not is_filler(row[k]) for k in timed)
+    return any(values.values()) and full[0] == columns[0] and len(full) > _ROW * len(columns) and not worded
 
 
 def _is_remark(row: Sequence[str], columns: Sequence[int], width: int) -> bool:
@@ -285,4 +308,4 @@ def _count_filled(row: Sequence[str], columns: Sequence[int]) -> int:
 
 
 def _is_value(cell: str) -> bool:
-    return is_number_like(cell) or is_stamp(cell)
+    return is_number_like(cell) or is_stamp(cell) or has_unit(cell)

@@ -7,6 +7,9 @@ from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, find_named_quantity
 
+#: units of the output of transducers, in lower case
+_ELECTRIC = ("v", "mv", "vdc", "v dc", "volt", "volts", "ma", "pulses", "imp", "counts", "inc", "digits")
+
 
 def refuse_nameless(headings: Sequence[str], source: str) -> None:
     """Reject numeric columns whose names suggest a temperature, a displacement or a speed but have no unit."""
@@ -28,6 +31,8 @@ def why_left_out(heading: str) -> str:
     """Return the information that is missing in an uninterpretable heading, and the required action."""
     found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
+    if unit := find_electric_unit(heading):
+        return f"{heading!r} is in {unit}: {tell_sensitivity(unit)}, in a mapping [columns.NAME] with its column"
     mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
     ignore = 'role = "ignore" if it is of no use'
     if not found and "_" not in heading:
@@ -48,6 +53,21 @@ def why_left_out(heading: str) -> str:
     return (
         f"{heading!r}: {symbol!r} is read as a unit of {meant.quantity} only with a mapping; write {mapped} role = "
         f'"{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
+    )
+
+
+def find_electric_unit(heading: str) -> str:
+    """Return the unit of a heading with the output of a transducer, such as ``V`` or ``mA``; empty if it has none."""
+    found = BRACKETS.fullmatch(heading.strip())
+    symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
+    return symbol if symbol.casefold() in _ELECTRIC and symbol != heading else ""
+
+
+def tell_sensitivity(unit: str) -> str:
+    """Return how the output of a transducer becomes a channel."""
+    return (
+        f'state its sensitivity: role = "displacement", unit = "um" and scale = the um per {unit}, or role = '
+        f'"spindle_speed", unit = "1/min" and scale = the speed per {unit} (600 if 10 {unit} are 6000 1/min), and zero'
     )
 
 

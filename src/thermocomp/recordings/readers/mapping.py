@@ -86,8 +86,8 @@ class ColumnMap:
         Factor from the number in the file to `unit`.
     zero : float or 'first'
         Number in the file that counts as zero; ``first``: the first valid one of the column.
-    missing : tuple of float
-        Numbers in the file that denote a missing value.
+    missing : tuple of float or str
+        Numbers or words in the file that denote a missing value.
     place : str
         Location of the sensor as text.
     valid : tuple of float, optional
@@ -99,7 +99,7 @@ class ColumnMap:
     role: Role | None = None
     scale: float = 1.0
     zero: float | Literal["first"] = 0.0
-    missing: tuple[float, ...] = ()
+    missing: tuple[float | str, ...] = ()
     place: str = ""
     valid: tuple[float, float] | None = None
 
@@ -124,8 +124,8 @@ class ReadOptions:
         Encoding, such as ``cp1252``; empty: UTF-8, or Latin-1 if it is not UTF-8.
     comment : str
         Start of lines that are skipped; empty: none.
-    missing : tuple of float
-        Numbers that denote a missing value in every column.
+    missing : tuple of float or str
+        Numbers or words that denote a missing value in every column.
     only_mapped : bool
         True: columns without a table ``[columns.NAME]`` are left out.
     heading : int
@@ -140,7 +140,7 @@ class ReadOptions:
     decimal: Literal["", ".", ","] = ""
     encoding: str = ""
     comment: str = "#"
-    missing: tuple[float, ...] = ()
+    missing: tuple[float | str, ...] = ()
     only_mapped: bool = False
     heading: int = 0
     skip: tuple[int | tuple[int, int], ...] = ()

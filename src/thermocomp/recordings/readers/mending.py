@@ -164,7 +164,7 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
         for shown, options in guess_columns(table, mapping):
-            dialogue.ask(Question(f"column {shown} has no known unit", tuple(options), "column"))
+            dialogue.ask(Question(f"column {shown}", tuple(options), "column"))
     recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
     for _ in range(_ROUNDS):
         before, mapping = dialogue.draft.text, dialogue.draft.mapping(owner)
@@ -175,7 +175,9 @@ def mend(path: str | Path, text: str, decide: Decide) -> Mended:
         if dialogue.draft.text == before:
             break
         recording = dialogue.until(lambda: read(path, dialogue.draft.mapping(owner)))
-    return Mended(dialogue.draft.text, recording, tuple(dialogue.decided))
+    # what only the user knows, such as the sensitivity of a probe
+    open_ = [f"# {q.text}\n" for q, _ in dialogue.decided if q.severity == "column" and len(q.options) == 1]
+    return Mended(dialogue.draft.text + "".join(open_), recording, tuple(dialogue.decided))
 
 
 def read_or_offer(path: str | Path, mapping: Mapping | None = None) -> Recording:
@@ -293,8 +295,8 @@ class _Dialogue:
 
 
 def _skips(remedy: Remedy) -> bool:
-    """Return whether a suggested mapping entry skips a row of the file."""
-    return "skip" in remedy.get("read", {})
+    """Return whether a suggested mapping entry skips a row of the file; ranges of rows are other tests."""
+    return any(isinstance(place, int) for place in remedy.get("read", {}).get("skip", ()))
 
 
 def _offer(path: Path, mapping: Mapping, error: InputError) -> str:

@@ -66,7 +66,8 @@ class ParquetTable(FileTable):
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
         found = self._first_cells.get(column)
-        return column not in self.others if found is None else first_is_number(found, empty=empty)
+        number = column not in self.others if found is None else first_is_number(found, empty=empty)
+        return number or column in self.units
 
     def head(self, column: int) -> list[str]:
         """Return the first non-empty cells of a column; see `thermocomp.recordings.readers.tables.FileTable.head`."""

@@ -1,4 +1,4 @@
-"""Recordings as files: reading of CSV, XLSX, ODS and Parquet, writing of CSV and Parquet."""
+"""Recordings as files: reading of text, XLSX, ODS, Parquet and MTConnect, writing of CSV and Parquet."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

@@ -12,17 +12,21 @@ import pandas as pd
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, Remedy
+from thermocomp.recordings.readers.cellunits import strip_units
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
 
 #: key of the column description embedded by thermocomp, in a comment line or a Parquet attribute
 EMBEDDED = "thermocomp"
 #: maximum number of cells used to determine the kind of a column
-_HEAD = 100
+HEAD = 100
 #: maximum number of cell locations listed
 _MOST_TOLD = 40
 _UNGROUPED = re.compile(r"[-+]?\d{4}")
 
+#: a word or a phrase, and the most frequent occurrence of unknown ones among the numbers of a column
+_WORDS = re.compile(r"[^\W\d_]{2}[^\d]*")
+_RARE = 0.1
 #: start of a text that a spreadsheet evaluates, optionally after apostrophes
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n\u240d\u240a]")
 _LINE_ENDS, _LINE_SIGNS = {13: "\u240d", 10: "\u240a"}, {0x240D: "\r", 0x240A: "\n"}
@@ -46,6 +50,14 @@ class FileTable(ABC):
         Decimal sign of numbers stored as text, if it is known beforehand.
     notes : tuple of str
         Notes for the user.
+    above : tuple of tuple of str
+        Rows of text around the headings.
+    again : tuple of int
+        Line numbers (1-based) of repeated headings.
+    units : dict of int to str
+        Units of the columns in whose cells a unit follows the number.
+    words : frozenset of str
+        Further texts that denote a missing number, in lower case.
     """
 
     path: Path
@@ -53,6 +65,10 @@ class FileTable(ABC):
     embedded: str = field(default="", kw_only=True)
     decimal: str = field(default="", kw_only=True)
     notes: tuple[str, ...] = field(default=(), kw_only=True)
+    above: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)
+    again: tuple[int, ...] = field(default=(), kw_only=True)
+    units: dict[int, str] = field(default_factory=dict, kw_only=True)
+    words: frozenset[str] = field(default=frozenset(), kw_only=True)
 
     @abstractmethod
     def is_number(self, column: int, *, empty: bool = True) -> bool:
@@ -72,6 +88,10 @@ class FileTable(ABC):
     @abstractmethod
     def place(self, row: int) -> str:
         """Return the location of a row in the file, such as ``line 7``."""
+
+    def bare(self, column: int, cells: "pd.Series[Any]") -> "pd.Series[Any]":
+        """Return cells of a column without their units."""
+        return strip_units(cells, self.units[column]) if column in self.units else cells
 
 
 @dataclass(frozen=True)
@@ -95,7 +115,7 @@ class FrameTable(FileTable):
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if there is none."""
-        return first_is_number(self.frame[column], empty=empty)
+        return column in self.units or first_is_number(self.frame[column], empty=empty)
 
     def head(self, column: int) -> list[str]:
         """Return the first non-empty cells of a column; see `FileTable.head`."""
@@ -126,7 +146,7 @@ def first_texts(cells: "pd.Series[Any]") -> list[str]:
     """Return the first non-empty cells of a column as text; none for a numeric column."""
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return []
-    return [text for text in map(str, cells.iloc[:_HEAD].dropna()) if not is_filler(text)]
+    return [text for text in map(str, cells.iloc[:HEAD].dropna()) if not is_filler(text)]
 
 
 def as_floats(cells: "pd.Series[Any]") -> FloatArray:
@@ -179,14 +199,20 @@ def check_headings(path: Path, headings: Sequence[str], n_rows: int, limits: Fil
         raise RecordingError(f"{path}: a heading line but no rows below it; the recording is empty")
 
 
-def refuse_cell(table: FileTable, row: int, column: int, cell: object) -> NoReturn:
-    """Raise the error for a cell that contains text where a number is expected."""
+def refuse_cell(table: FileTable, row: int, column: int, cell: object, *, often: bool = False) -> NoReturn:
+    """Raise the error for a cell that contains text where a number is expected; `often`: so do other rows."""
     heading = table.headings[column]
+    word: list[Remedy] = [{"read": {"missing": [str(cell).strip()]}}] if _is_text(cell) else []
     raise RecordingError(
         f"{table.path}: {table.place(row)}, column {heading!r}: {str(cell)!r} is not a number; correct the cell, leave "
         'it empty for a missing value, or leave the column out by a mapping with role = "ignore"',
-        [skip_row(table, row), {"columns": {heading: {"role": "ignore"}}}],
+        [*([] if often and word else [skip_row(table, row)]), *word, {"columns": {heading: {"role": "ignore"}}}],
     )
+
+
+def _is_text(cell: object) -> bool:
+    """Return whether a cell is a word or a phrase, which cannot be a mistyped number."""
+    return isinstance(cell, str) and _WORDS.fullmatch(cell.strip()) is not None
 
 
 def skip_row(table: FileTable, row: int) -> Remedy:
@@ -207,6 +233,7 @@ def convert_all(
 ) -> tuple[dict[int, FloatArray], tuple[str, ...]]:
     """Read the numbers of text columns, all in one notation; see `convert`."""
     signs = Signs()
+    columns = {k: table.bare(k, cells) for k, cells in columns.items()}
     for cells in columns.values():
         signs.add(cell for cell in cells if isinstance(cell, str))
     notation = decide(signs, decimal, "", table.path)
@@ -242,6 +269,7 @@ def convert(
     """
     values, odd = read_plain(cells, notation.decimal)
     words: dict[str, list[int]] = {}
+    unknown: list[int] = []
     grouped = -1
     for row in np.flatnonzero(odd):
         cell = cells.iloc[row]
@@ -250,10 +278,15 @@ def convert(
             values[row] = number
             if grouped < 0 and any(s in cell.strip() for s in notation.thousands):
                 grouped = int(row)
-        elif not isinstance(cell, str) or not is_filler(cell):
-            refuse_cell(table, int(row), column, cell)
-        elif is_word(cell):
+        elif not isinstance(cell, str) or not (is_filler(cell) or cell.strip().casefold() in table.words):
+            if not _is_text(cell):
+                refuse_cell(table, int(row), column, cell)
+            unknown.append(int(row))
             words.setdefault(cell.strip(), []).append(int(row))
+        elif is_word(cell) or cell.strip().casefold() in table.words:
+            words.setdefault(cell.strip(), []).append(int(row))
+    if len(unknown) > _RARE * len(cells):
+        refuse_cell(table, unknown[0], column, cells.iloc[unknown[0]], often=len(unknown) > 1)
     if grouped >= 0:
         _refuse_mixed(table, column, cells, grouped)
     return values, tuple(

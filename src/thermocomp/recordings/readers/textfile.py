@@ -1,6 +1,7 @@
 """CSV files: the format is detected from the file, then pandas reads the selected columns."""
 
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,12 +13,17 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.recordings.headings import is_understood
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
     FileLayout,
+    find_columns,
     find_end,
     find_layout,
+    find_rest,
+    find_timed,
+    is_row,
     join_units,
     name_stamps,
     tell_again,
@@ -28,6 +34,7 @@ from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.numbers import MISSING_TEXT, Notation, Signs, is_filler, is_number_like
 from thermocomp.recordings.readers.tables import (
+    HEAD,
     FileTable,
     check_headings,
     clean_heading,
@@ -38,8 +45,9 @@ from thermocomp.recordings.readers.tables import (
 from thermocomp.recordings.readers.textlines import Lines, count_cells, describe_ragged, is_utf8, open_lines, split_line
 
 #: maximum number of lines used to detect the format; fewer if they are long
-_SAMPLE_LINES = 100
+_SAMPLE_LINES = 300
 _SAMPLE_BYTES = 2 << 20
+_MOST_RAGGED = 1_000
 _CHUNK = 100_000  # rows in memory as text at a time
 _MISSING = [text for t in MISSING_TEXT for text in {t, t.upper(), t.capitalize()}] + ["NaN", "-NaN"]
 # by default, pandas before 3.1 may read the last digit incorrectly
@@ -65,6 +73,8 @@ class CsvTable(FileTable):
         Line numbers (0-based) of lines that are not rows: headings, comments, blank lines.
     data : bytes or None
         Content of the whole file in UTF-8, if conversion was necessary.
+    short : bool
+        Rows may end before their last cells.
     embedded, decimal, notes
         See `thermocomp.recordings.readers.tables.FileTable`.
     """
@@ -76,9 +86,12 @@ class CsvTable(FileTable):
     skipped: tuple[int, ...]
     n_rows: int
     data: bytes | None = None
+    short: bool = False
 
     def is_number(self, column: int, *, empty: bool = True) -> bool:
         """Return whether the first non-empty cell of a column is a number; `empty` if the first rows have none."""
+        if column in self.units:
+            return True
         cells = (row[column] for row in self.sample if column < len(row))
         first = next((c for c in cells if not is_filler(c)), None)
         return empty if first is None else is_number_like(first)
@@ -107,7 +120,7 @@ class CsvTable(FileTable):
         written = [k for k in numbers if frame[k].dtype == bool or not pd.api.types.is_numeric_dtype(frame[k].dtype)]
         for k in written:
             # pandas reads True as a number
-            frame[k] = frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell)
+            frame[k] = self.bare(k, frame[k].map(lambda cell: str(cell) if isinstance(cell, bool | np.bool_) else cell))
             signs.add(cell for cell in frame[k] if isinstance(cell, str))
         notation = decide(signs, decimal if self.decimal or signs.proven else "", self.delimiter, self.path)
         notes = tell_notation(notation)
@@ -158,7 +171,7 @@ class CsvTable(FileTable):
             "skipinitialspace": True,
             "encoding": self.encoding,
             "encoding_errors": self.errors,
-            "chunksize": _CHUNK,
+            "chunksize": max(self.n_rows, 1) if self.short else _CHUNK,  # pandas counts the cells of the first chunk
             "keep_default_na": False,
             "na_values": {k: [""] if types[k] is str else _MISSING for k in types},
         }
@@ -180,14 +193,16 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
     n_remarks = find_end(rows, [split(line) for _, line in body.tail])
     remarks = [number for number, _ in body.tail][len(body.tail) - n_remarks :]
     if body.ragged and not (remarks and body.ragged[0] >= remarks[0]):
-        raise RecordingError(body.ragged[1], [{"read": {"skip": [body.ragged[0] + 1]}}])
+        number, cells, line = body.ragged
+        told_ragged = describe_ragged(path, number + 1, cells, body.width, line, delimiter)
+        raise RecordingError(told_ragged, [{"read": {"skip": [number + 1]}}])
     try:
         headings = [
             clean_heading(h) for h in split(first[layout.heading][1], "strict" if options.encoding else "replace")
         ]
     except UnicodeDecodeError as e:
         raise RecordingError(f"{path}: the heading line is not written in {encoding}: {e.reason}") from e
-    headings += [""] * (body.width - len(headings))
+    headings = [*headings, *[""] * (body.width - len(headings))][: body.width]
     check_headings(path, headings, body.n_rows, limits)
     if layout.units != layout.heading:
         number, text = first[layout.units]
@@ -201,14 +216,17 @@ def open_csv(path: Path, options: ReadOptions, limits: FileLimits) -> CsvTable:
         path=path,
         data=data,
         headings=tuple(headings),
-        sample=tuple(map(tuple, rows)),
+        sample=tuple(map(tuple, rows[:HEAD])),
         delimiter=delimiter,
         decimal=options.decimal,
         encoding=encoding,
         errors="strict" if options.encoding else "replace",
+        short=body.short,
         skipped=tuple(sorted((*body.skipped, *remarks))),
         n_rows=body.n_rows - len(remarks),
         embedded=lines.embedded(),
+        again=tuple(body.again),
+        above=find_rest([split(line) for _, line in first[: layout.begin]], layout),
         notes=(
             *told,
             *tell_layout([number + 1 for number, _ in first], layout, "line"),
@@ -233,11 +251,12 @@ class _Body(NamedTuple):
 
     skipped: list[int]  #: line numbers of lines that are not rows (0-based)
     width: int
+    short: bool  #: rows may end before their last cells
     n_rows: int
     odd: list[bytes]  #: lines that are not UTF-8
     again: list[int]  #: line numbers of repeated headings (1-based)
     tail: list[tuple[int, bytes]]  #: the last rows
-    ragged: tuple[int, str] | None  #: first row with another number of cells, and the message about it
+    ragged: tuple[int, int, bytes] | None  #: number, count of cells and text of the first row with another count
 
 
 def _read_head(lines: Lines) -> _Head:
@@ -268,37 +287,74 @@ def _sample(content: Iterator[tuple[int, bytes]], top: int) -> list[tuple[int, b
 
 def _scan(lines: Lines, head: _Head) -> _Body:
     heading, delimiter, ending = head.lines[head.layout.heading][1], head.delimiter, head.delimiter.encode()
+    headers = {line for _, line in head.lines[head.layout.heading : head.layout.begin]}
     skipped, odd, again = list[int](), list[bytes](), list[int]()
-    number, ragged = 0, None
+    number, ragged, least = 0, list[tuple[int, int, bytes]](), _count_usual(head)
+    most = least
     width, n_rows = count_cells(heading, delimiter), int(head.in_remark) - head.layout.begin
     top, plain, long = lines.options.heading - 1, delimiter != " ", lines.limits.cell_characters
     for number, line in lines.content(skipped):
         if not line.isascii() and len(odd) < _SAMPLE_LINES and not is_utf8(line):
             odd.append(line)
         n_rows += number >= top
-        if n_rows <= 0 or line == heading:  # lines above the rows; headings repeated after a restart of the logger
-            again += [number + 1] if n_rows > 0 else []
+        if n_rows <= 0 or line in headers:  # lines above the rows; headings repeated after a restart of the logger
+            again += [number + 1] if n_rows > 0 and line == heading else []
             n_rows -= n_rows > 0
             skipped.append(number)
             continue
         cells = line.count(ending) + 1 if plain and b'"' not in line else count_cells(line, delimiter)
         if n_rows == 1 and cells == width + 1 and line.rstrip(b" \r\n").endswith(ending):
             width += 1  # a logger that ends its rows, but not the heading line, with the delimiter
-        if cells != width and ragged is None:
-            ragged = number, describe_ragged(lines.path, number + 1, cells, width, line, delimiter)
+        most = cells if most < cells <= width else most
+        if not least <= cells <= width and len(ragged) <= _MOST_RAGGED:
+            ragged.append((number, cells, line))
         if len(line) > long:
             most = max(map(len, split_line(line.decode("latin-1"), delimiter)))
             lines.limits.check("cell_characters", most, f"{lines.path}: line {number + 1}")
+    if again and (above := _find_preambles(lines, head, again)):
+        n_rows -= len(above)
+        skipped = sorted({*skipped, *above})
+        ragged = [row for row in ragged if row[0] not in above]
     tail = lines.read_tail(1 + max(number, *skipped[-1:]), skipped)[-MOST_REMARKS:]
     return _Body(
         skipped=skipped,
-        width=width,
+        width=most if least < width else width,
+        short=least < width,
         n_rows=n_rows,
         odd=odd,
         again=again,
         tail=tail[-n_rows:] if n_rows > 0 else [],
-        ragged=ragged,
+        ragged=ragged[0] if ragged else None,
     )
+
+
+def _count_usual(head: _Head) -> int:
+    """Return the least number of cells of a row: rows may end before empty cells of columns without a unit."""
+    names = split_line(head.lines[head.layout.heading][1].decode("utf-8", "replace"), head.delimiter)
+    counts = [count_cells(line, head.delimiter) for _, line in head.lines[head.layout.begin :]]
+    usual = max(counts, key=counts.count, default=len(names))
+    short = 2 < usual < len(names) and 2 * counts.count(usual) > len(counts) > 2
+    return usual if short and not any(map(is_understood, names[usual:])) else len(names)
+
+
+def _find_preambles(lines: Lines, head: _Head, again: Sequence[int]) -> set[int]:
+    """Return the lines (0-based) of preambles above repeated headings, as loggers write them at every start."""
+
+    def split(line: bytes) -> list[str]:
+        return split_line(line.decode("utf-8", "replace"), head.delimiter)
+
+    rows = [split(line) for _, line in head.lines[head.layout.begin :]]
+    columns, timed = find_columns(rows)[1], find_timed(rows)
+    found, repeated = set[int](), {*again}
+    before = deque[tuple[int, bytes]](maxlen=_SAMPLE_LINES)
+    for number, line in lines.content([]):
+        if number + 1 in repeated:
+            while before and not is_row(split(before[-1][1]), columns, timed):
+                found.add(before.pop()[0])
+            before.clear()
+        else:
+            before.append((number, line))
+    return found - {number for number, _ in head.lines[: head.layout.begin]}
 
 
 def _find_table(

@@ -14,7 +14,7 @@ from thermocomp.recordings.headings import (
     strip_format,
 )
 from thermocomp.recordings.readers.cellkinds import Kinds
-from thermocomp.recordings.readers.dayforms import names_day
+from thermocomp.recordings.readers.dayforms import EPOCH, PARTS, names_day
 from thermocomp.recordings.readers.dayhalves import are_halves, says_halves
 from thermocomp.recordings.readers.mapping import Mapping, Place
 from thermocomp.recordings.readers.tables import FileTable
@@ -36,6 +36,8 @@ _PASSED = re.compile(
     r"elapsed|relativ|\brel\b|dauer|laufzeit|duration|dur[ée]e|durata|duraci|run[ _]?time|test[ _]?time|\bsince\b"
     r"|passed|verstrichen|vergangen|écoul|trascors"
 )
+#: a count of seconds or parts of a second since 1970
+_COUNT = re.compile(r"\s*\d{9,19}(?:\.\d*)?\s*")
 
 
 class TimePlan(NamedTuple):
@@ -57,7 +59,7 @@ def find_time(table: FileTable, meanings: Sequence[Meaning | None], mapping: Map
         time = find_position(mapping.time.column, headings, "[time]", source)
         date = find_position(mapping.time.date, headings, "[time]", source) if mapping.time.date else None
     else:
-        time, date, notes = _by_name(headings, meanings, source, kinds)
+        time, date, notes = _by_name(table, meanings, kinds)
     if date is None and mapping.time.unit in ("", "timestamp") and not mapping.time.format:
         time, date = _paired(time, headings, mapping, kinds)
         if date is not None:
@@ -111,13 +113,13 @@ def has_passed(heading: str) -> bool:
     return _PASSED.search(heading.casefold()) is not None or find_clock_form(heading).startswith(("d", "m", "s"))
 
 
-def _by_name(
-    headings: Sequence[str], meanings: Sequence[Meaning | None], source: str, kinds: Kinds
-) -> tuple[int, int | None, list[str]]:
+def _by_name(table: FileTable, meanings: Sequence[Meaning | None], kinds: Kinds) -> tuple[int, int | None, list[str]]:
+    headings, source = table.headings, str(table.path)
     timed = {k: m for k, m in enumerate(meanings) if m is not None and m.unit.quantity == "time"}
     # of two columns with one name the first is used
     plain = {plain_name(h): k for k, h in reversed(list(enumerate(headings)))}
-    named = [k for k, m in timed.items() if is_time_name(m.base) and plain_name(headings[k]) not in _FRACTIONS]
+    fractions = {k for k, h in enumerate(headings) if {plain_name(h), _bare_name(h)} & {*_FRACTIONS}}
+    named = [k for k, m in timed.items() if is_time_name(m.base) and k not in fractions]
     clear = [k for k in named if timed[k].base != "T"]  # T_s may be a surface temperature
     if clear:
         return clear[0], None, []
@@ -129,17 +131,26 @@ def _by_name(
         return (clock, date, []) if alone is None else (alone, None, [])
     names = (*(n for n in _BARE if n in plain), *(n for n in plain if is_time_name(n)))
     bare = [plain[name] for name in names if name not in _NEEDS_UNIT or kinds(plain[name]) in ("date", "stamp")]
-    if bare or named:
-        return [*bare, *named][0], None, []
+    best = next(iter((*bare, *named)), None)
+    # a number without a unit, such as that of the scan, only if no other column holds dates
+    head = table.head(best) if best is not None and best in bare else []
+    constant = len(head) > 1 and len(set(head)) == 1  # a duration; dates have a time of day beside them
+    counts = bool(head) and kinds(bare[0]) == "number" and not _is_epoch(head)
+    uncertain = best is None or counts or (constant and kinds(bare[0]) != "date")
+    held = _by_cells(table, kinds) if uncertain else None
+    if best is not None:
+        return held or (best, None, [])
     if len(timed) == 1:
         index = next(iter(timed))
         return index, None, [f"{headings[index]!r} is taken as the time"]
+    if held and held[1] is None:
+        return held
     if len(parts := find_parts(headings)) > 1:
         raise RecordingError(
             f"{source}: the time is split over {len(parts)} columns, {', '.join(parts)}: combine them into one, such "
             "as 2024-03-13 08:00:00 below the heading timestamp"
         )
-    if held := _by_cells(headings, kinds):
+    if held:
         return held
     raise RecordingError(
         f"{source}: no time column found among {', '.join(h for h in headings if h)}; name it time_s (or time_min, "
@@ -147,16 +158,33 @@ def _by_name(
     )
 
 
-def _by_cells(headings: Sequence[str], kinds: Kinds) -> tuple[int, int | None, list[str]] | None:
-    """Find the only column of dates with a time of day, or the only columns of dates and of times of day."""
-    held = [kinds(k) for k in range(len(headings))]
-    if held.count("stamp") == 1:
-        time = held.index("stamp")
-        return time, None, [f"{headings[time]!r} holds dates: taken as the time"]
-    if held.count("stamp") or held.count("date") != 1 or held.count("clock") != 1:
+def _by_cells(table: FileTable, kinds: Kinds) -> tuple[int, int | None, list[str]] | None:
+    """Find a time by the cells: dates with a time of day, dates beside times of day, or seconds since 1970.
+
+    Of several such columns the one whose cells differ most from row to row is the time; the names and then the order
+    of the columns break ties.
+    """
+    headings, held = table.headings, [kinds(k) for k in range(len(table.headings))]
+
+    def rank(k: int) -> tuple[int, bool, int]:
+        return -len(set(table.head(k))), not is_time_name(headings[k]), k
+
+    stamps = sorted((k for k, kind in enumerate(held) if kind == "stamp"), key=rank)
+    if not stamps and held.count("date") == 1 and held.count("clock") == 1:
+        time, date = held.index("clock"), held.index("date")
+        return (time, date, [_tell_pair(headings, time, date)]) if not has_passed(headings[time]) else None
+    epochs = [k for k, kind in enumerate(held) if kind == "number" and _is_epoch(table.head(k))]
+    if not (found := stamps or epochs):
         return None
-    time, date = held.index("clock"), held.index("date")
-    return (time, date, [_tell_pair(headings, time, date)]) if not has_passed(headings[time]) else None
+    return found[0], None, [f"{headings[found[0]]!r} holds dates: taken as the time"]
+
+
+def _is_epoch(cells: Sequence[str]) -> bool:
+    """Return whether all cells are rising counts of seconds, milliseconds and so on since 1970."""
+    if not all(map(_COUNT.fullmatch, cells)):
+        return False
+    counts = [float(cell) for cell in cells]
+    return any(EPOCH[0] * n <= counts[0] <= counts[-1] < EPOCH[1] * n for n in PARTS) and counts == sorted(counts)
 
 
 def _tell_pair(headings: Sequence[str], time: int, date: int) -> str:

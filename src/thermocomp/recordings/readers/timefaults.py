@@ -1,5 +1,7 @@
 """Invalid times of a recording: decreasing times, or clock changes."""
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NoReturn
 
 import numpy as np
@@ -30,6 +32,10 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
     what = "occurs twice" if time[row] == time[row - 1] else f"is before {shown.iloc[row - 1]}"
     more = f" ({wrong.size} rows like this)" if wrong.size > 1 else ""
     text = f"{file.at(row)}: time {shown.iloc[row]} {what}, in {table.place(row - 1)}{more}"
+    lines = [int(table.place(k).split()[-1]) for k in (0, row - 1, row, len(time) - 1)]
+    if any(lines[1] < again < lines[2] for again in table.again):
+        ends = [lines[0] - 1, *table.again, lines[3] + 1]
+        refuse_tests(file.at(row), [[a + 1, b - 1] for a, b in pairwise(ends) if a + 1 < b])
     steps = np.diff(time)
     if len(steps) > 1 and (steps < 0).all():
         raise RecordingError(f"{text}: the newest row comes first; sort the rows by time, the oldest first")
@@ -53,6 +59,15 @@ def refuse_falling(wrong: IntArray, time: FloatArray, shown: "pd.Series[Any]", s
         )
     raise RecordingError(
         f"{text}; time must increase: delete or correct the row, or split the file into tests", [skip_row(table, row)]
+    )
+
+
+def refuse_tests(where: str, spans: Sequence[Sequence[int]]) -> NoReturn:
+    """Raise the error for times that start again below a repeated heading, in tests with these first and last lines."""
+    raise TwoReadingsError(
+        f"{where}: the time starts again below a repeated heading: the file holds {len(spans)} tests; read one of them "
+        "by skipping the lines of the others in a mapping, [read] skip",
+        [{"read": {"skip": [[*span] for span in spans if span is not kept]}} for kept in spans],
     )
 
 

@@ -22,6 +22,7 @@ from thermocomp.recordings.readers.layout import (
     FileLayout,
     find_end,
     find_layout,
+    find_rest,
     join_units,
     tell_end,
     tell_layout,
@@ -137,6 +138,7 @@ def _table(
     layout = find_layout(_sample(first)) or FileLayout(0, 0, 1)
     begin = layout.begin
     headings = [_text(cell).strip() for cell in first[layout.heading]]
+    above = find_rest([[*map(_text, row)] for row in first[:begin]], layout)
     if layout.units != layout.heading:
         units, *below = ([_text(cell) for cell in row] for row in (first[layout.units], *first[begin:]))
         headings = join_units(headings, units, below, where, places[layout.units])
@@ -151,7 +153,15 @@ def _table(
         {k: columns[k][:n_rows] if k < len(columns) else empty for k in range(len(headings))}, copy=False
     )
     told = (*notes, *tell_layout(places, layout, "row"), *tell_end(places[begin + n_rows :], "row"))
-    return FrameTable(path, tuple(headings), frame, places[begin : begin + n_rows], notes=told, decimal=options.decimal)
+    return FrameTable(
+        path,
+        tuple(headings),
+        frame,
+        places[begin : begin + n_rows],
+        notes=told,
+        decimal=options.decimal,
+        above=above,
+    )
 
 
 def _count_remarks(head: Sequence[Row], tail: Sequence[Row]) -> int:
