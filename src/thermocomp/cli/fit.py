@@ -1,7 +1,9 @@
 """`thermocomp fit`: a model with its honest error, in a file."""
 
 from thermocomp.api.results import FittedModels
+from thermocomp.cli import judged
 from thermocomp.cli.face import CommandFace, command
+from thermocomp.cli.terminal import console, print_items
 from thermocomp.report import printed
 
 
@@ -20,5 +22,9 @@ def fit(found: FittedModels, face: CommandFace) -> int:
         0 done, 1 a component was refused, 2 unusable input.
     """
     face.write(found.save)
-    face.show_items(lambda: {"file": str(face.output), **found.to_dict()}, printed.fit(found.fitted), "Model file")
+    face.answer(
+        lambda: {"file": str(face.output), **found.to_dict()},
+        lambda: judged.fit(found, face.files, face.following("explain", model=face.output)),
+        lambda: print_items(printed.fit(found.fitted), console),
+    )
     return 1 if any(a.word == "refused" for a in found.fitted.comparison.overall()) else 0

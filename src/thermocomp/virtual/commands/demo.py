@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from thermocomp.cli import loudness
+from thermocomp.cli.answers import Answer, print_answer
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
@@ -38,11 +40,15 @@ def demo(
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
     if not json:
-        console.print("[bold]1. The virtual machine tool runs a drift test[/]")
-    simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
+        console.print("A virtual machine tool runs a drift test; five methods are judged on unseen thermal cycles.")
+    simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=True)
+    compare([recording], output=report, overwrite=overwrite, json=json, part=True)
+    code: int = fit([recording], output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
     if not json:
-        console.print("\n[bold]2. Five methods, judged on unseen thermal cycles[/]")
-    compare([recording], output=report, overwrite=overwrite, json=json)
-    if not json:
-        console.print("\n[bold]3. 'averaged', fitted to all cycles and frozen[/]")
-    return fit([recording], output=model, overwrite=overwrite, quiet=json)
+        told = Answer(
+            head="The model file has 'averaged', fitted to all cycles.",
+            files=[recording, report, model],
+            following=("thermocomp", "explain", str(model)),
+        )
+        print_answer(told, console, hint=not loudness.details)
+    return code

@@ -1,0 +1,194 @@
+"""Answer of a command: at most twelve lines and one table; all other results are printed with ``--details`` only."""
+
+import shlex
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from thermocomp.cli.terminal import ROW_STYLES, marked, words
+from thermocomp.core.explained import Explanation
+from thermocomp.core.shown import shorten
+from thermocomp.report.layout import Layout, PrintedLine, Toned
+
+#: largest number of lines of the table, without its heading
+ROWS = 25
+#: largest length of a word in a cell [characters]
+WORD = 26
+#: number of names listed before the others are only counted
+FEW = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What a command prints without ``--details``.
+
+    Parameters
+    ----------
+    head : str
+        What to use, or what was found; at most three lines.
+    lines : sequence of PrintedLine
+        Below the table, at most two lines each.
+    warnings : sequence of str
+        The worst first: only this one is printed, and the number of the others.
+    files : sequence
+        Paths of the files written.
+    following : sequence of str
+        Words of the next command; empty if there is none.
+    """
+
+    head: str
+    table: Layout | None = None
+    lines: Sequence[PrintedLine] = ()
+    warnings: Sequence[str] = ()
+    files: Sequence[object] = ()
+    following: Sequence[str] = ()
+
+
+def fold(text: str, lines: int, width: int, more: str = "") -> list[str]:
+    """Return a text and `more` in lines of words; one that does not fit ends with dots and `more`."""
+    folded = textwrap.wrap(text + more, width, break_long_words=False, break_on_hyphens=False)
+    if len(folded) <= lines:
+        return folded
+    return textwrap.wrap(
+        text,
+        width,
+        max_lines=lines,
+        placeholder=f" ...{more}",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def few(names: Sequence[str]) -> str:
+    """Return the first names, and the number of the others, as text."""
+    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+    return ", ".join(names[:FEW]) + more
+
+
+def spares(wanted: Mapping[str, str]) -> list[PrintedLine]:
+    """Return a line about the sensors that want a spare, each with the reason."""
+    first = next((f" ({name}: {why})" for name, why in wanted.items()), "none")
+    return [PrintedLine(f"Sensors that want a spare: {few(list(wanted))}{first}.")]
+
+
+def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
+    """Return a line about the sensors of models that want a spare."""
+    if not any(s.watched for e in models for s in e.sensors):
+        return [PrintedLine("Sensors are not monitored: a wrong value is not detected.")]
+    return spares({s.name: s.spare for e in models for s in e.sensors if s.spare})
+
+
+def in_unit(target: str, unit: str) -> str:
+    """Return the name of a target, with its unit unless that is um."""
+    return target if unit == "um" else f"{target} [{unit}]"
+
+
+def free(name: str) -> Path:
+    """Return a path of the current folder that does not exist: the name, or the name with a number."""
+    path, number = Path(name), 1
+    while path.exists():
+        number += 1
+        path = Path(name).with_stem(f"{Path(name).stem}-{number}")
+    return path
+
+
+def count_others(number: int) -> str:
+    """Return the number of warnings that are not printed, and how to print them."""
+    return f" ({number} more: --details)" if number else ""
+
+
+def print_answer(answer: Answer, console: Console, *, hint: bool = True) -> None:
+    """Print an answer.
+
+    Parameters
+    ----------
+    answer : Answer
+    console : Console
+    hint : bool
+        Say that ``--details`` prints more.
+    """
+    if answer.head:
+        print_folded(PrintedLine(answer.head), 3, console)
+    left = 0 if answer.table is None else _print_table(answer.table, console)
+    for line in answer.lines:
+        print_folded(line, 2, console)
+    if answer.warnings:
+        print_folded(PrintedLine(answer.warnings[0], Toned("but ", "doubtful")), 2, console)
+    if answer.files:
+        print_folded(PrintedLine(f"Written: {', '.join(map(str, answer.files))}"), 2, console)
+    if hint:
+        others = len(answer.warnings) - 1
+        more = [f"{n} more {what}" for n, what in ((left, "rows"), (others, "warnings")) if n > 0]
+        console.print(words(f"--details prints {' and '.join([*more, 'all results'])}."), style="dim", soft_wrap=True)
+    if answer.following:
+        for text in _command(answer.following, console.width):
+            console.print(text, markup=False, soft_wrap=True)  # a mark-up would double the backslashes
+
+
+def print_folded(line: PrintedLine, lines: int, console: Console, more: str = "") -> None:
+    """Print a line of text, in at most `lines` lines of the terminal."""
+    mark = line.mark or Toned("", "strong")
+    first, *rest = fold(f"{mark}{line.text}", lines, console.width, more) or [""]
+    console.print(f"{marked(mark)}{words(first.removeprefix(mark))}", soft_wrap=True)
+    for text in rest:
+        console.print(words(text), soft_wrap=True)
+
+
+def _command(command: Sequence[str], width: int) -> list[str]:
+    """Return a command in lines that a shell joins, none of which ends with the name of an option."""
+    lines, quoted = ["Next:"], [shlex.quote(word) for word in command]
+    for word, after in zip(quoted, [*quoted[1:], ""], strict=True):
+        needed = len(f"{word} {after}" if word.startswith("-") else word)
+        if len(lines[-1]) + needed + 3 > width:
+            lines[-1] += " \\"
+            lines.append("   ")
+        lines[-1] += f" {word}"
+    return lines
+
+
+def _print_table(t: Layout, console: Console) -> int:
+    """Print a table without breaking words; return the number of rows that do not fit."""
+    heads = [f"{c.heading}, {c.unit}" if c.unit else c.heading for c in t.columns]
+    rows = [[_shortened(c.text(row), WORD) for c in t.columns] for row in t.rows]
+    widths = _widths([heads, *rows], console.width)
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    for c, head, width in zip(t.columns, heads, widths, strict=True):
+        table.add_column(words(head), justify="right" if c.form else "left", width=width)
+    used = shown = 0
+    for k, row in enumerate(rows):
+        cells = [_shortened(cell, width) for cell, width in zip(row, widths, strict=True)]
+        used += max(len(textwrap.wrap(cell, width)) for cell, width in zip(cells, widths, strict=True))
+        if used > ROWS:
+            break
+        table.add_row(*map(marked, cells), style=ROW_STYLES.get(t.tone(k)))
+        shown += 1
+    console.print("", table, "", sep="\n")
+    return len(rows) - shown
+
+
+def _shortened(cell: str, longest: int) -> str:
+    """Return a cell without words longer than a number of characters."""
+    text = " ".join(shorten(word, max(longest, 4)) for word in cell.split())
+    return Toned(text, cell.tone) if isinstance(cell, Toned) else text
+
+
+def _widths(rows: Sequence[Sequence[str]], width: int) -> list[int]:
+    """Return the width of each column: headings in the first row are folded first, then the widest cells."""
+    columns = list(zip(*rows, strict=True))
+    least = [max((len(word) for cell in column for word in cell.split()), default=1) for column in columns]
+    cells = [max(own, *map(len, column[1:]), 1) for own, column in zip(least, columns, strict=True)]
+    widths = [max(own, len(column[0])) for own, column in zip(cells, columns, strict=True)]
+    while sum(widths) + 2 * (len(widths) - 1) > width:
+        loose = next(k for k in (_wider(widths, cells), _wider(widths, least), range(len(widths))) if k)
+        widths[max(loose, key=lambda k: widths[k])] -= 1
+    return widths
+
+
+def _wider(widths: Sequence[int], least: Sequence[int]) -> list[int]:
+    """Return the columns that are wider than a least width."""
+    return [k for k, (own, other) in enumerate(zip(widths, least, strict=True)) if own > other]
