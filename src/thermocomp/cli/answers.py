@@ -50,18 +50,17 @@ class Answer:
 
 
 def fold(text: str, lines: int, width: int, more: str = "") -> list[str]:
-    """Return a text and `more` in lines of words; one that does not fit ends with dots and `more`."""
-    folded = textwrap.wrap(text + more, width, break_long_words=False, break_on_hyphens=False)
-    if len(folded) <= lines:
-        return folded
-    return textwrap.wrap(
-        text,
-        width,
-        max_lines=lines,
-        placeholder=f" ...{more}",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    """Return a text and `more` in lines of whole words; a text that does not fit ends with dots before `more`."""
+    kept, dots = text[: lines * width].split(" "), ""
+    if len(text) > lines * width:
+        kept[-1], dots = "", " ..."
+    while True:
+        told = f"{' '.join(kept).rstrip()}{dots}{more}"
+        folded = textwrap.wrap(told, width, break_long_words=False, break_on_hyphens=False)
+        if len(folded) <= lines or len(kept) < 2:
+            return folded
+        kept.pop()
+        dots = " ..."
 
 
 def few(names: Sequence[str]) -> str:

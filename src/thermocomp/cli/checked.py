@@ -55,7 +55,7 @@ def _remedy(finding: Finding) -> str:
 
 def _overview(recordings: Sequence[dict[str, Any]]) -> Layout:
     columns = (
-        Column("recording", lambda r: r["name"]),
+        Column("file", lambda r: Path(r["source"]).name or r["name"]),
         Column("rows", "rows", ">", whole=True),
         Column("hours", "hours", ".2f", whole=True),
         Column("cycles", lambda r: len(r["cycles"]), ">", whole=True),

@@ -19,10 +19,12 @@ from rich.progress import (
 
 from thermocomp.cli import loudness
 from thermocomp.cli.terminal import make_console
-from thermocomp.core.shown import replace_unprintable
+from thermocomp.core.shown import replace_unprintable, shorten
 
 #: time of the first line without a terminal; each further one comes after four times as long [s]
 OFTEN, LATER = 30.0, 4.0
+#: length of the task in such a line [characters]
+LONGEST = 50
 
 _console = make_console(stderr=True)
 
@@ -100,7 +102,7 @@ class _Lines:
         took = time.monotonic() - self._begun
         if not self._silent and took >= self._next:
             self._next = LATER * took
-            print(f"{replace_unprintable(text)}: {done} after {took:.0f} s", file=sys.stderr, flush=True)
+            print(f"{shorten(text, LONGEST)}: {done} after {took:.0f} s", file=sys.stderr, flush=True)
 
 
 def _bar(done: ProgressColumn, hidden: bool) -> Progress:
