@@ -2,7 +2,7 @@
 
 import shlex
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,13 +10,14 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from thermocomp.cli import loudness
 from thermocomp.cli.terminal import ROW_STYLES, marked, words
 from thermocomp.core.explained import Explanation
 from thermocomp.core.shown import shorten
 from thermocomp.report.layout import Layout, PrintedLine, Toned
 
-#: largest number of lines of the table, without its heading
-ROWS = 25
+#: largest number of lines, and of lines of the table without its heading
+LINES, ROWS = 12, 25
 #: largest length of a word in a cell [characters]
 WORD = 26
 #: number of names listed before the others are only counted
@@ -30,9 +31,9 @@ class Answer:
     Parameters
     ----------
     head : str
-        What to use, or what was found; at most three lines.
+        What to use, or what was found.
     lines : sequence of PrintedLine
-        Below the table, at most two lines each.
+        Below the table.
     warnings : sequence of str
         The worst first: only this one is printed, and the number of the others.
     files : sequence
@@ -101,7 +102,7 @@ def count_others(number: int) -> str:
     return f" ({number} more: --details)" if number else ""
 
 
-def print_answer(answer: Answer, console: Console, *, hint: bool = True) -> None:
+def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: int = LINES) -> None:
     """Print an answer.
 
     Parameters
@@ -110,32 +111,49 @@ def print_answer(answer: Answer, console: Console, *, hint: bool = True) -> None
     console : Console
     hint : bool
         Say that ``--details`` prints more.
+    room : int
+        Largest number of lines, with those printed on stderr before.
     """
-    if answer.head:
-        print_folded(PrintedLine(answer.head), 3, console)
-    left = 0 if answer.table is None else _print_table(answer.table, console)
-    for line in answer.lines:
-        print_folded(line, 2, console)
-    if answer.warnings:
-        print_folded(PrintedLine(answer.warnings[0], Toned("but ", "doubtful")), 2, console)
-    if answer.files:
-        print_folded(PrintedLine(f"Written: {', '.join(map(str, answer.files))}"), 2, console)
+    written = [f"Written: {', '.join(map(str, answer.files))}"] if answer.files else []
+    if len(answer.files) > 1:  # a single path is never cut
+        written = fold(written[0], 2, console.width)
+    following = _command(answer.following, console.width) if answer.following else []
+    warned = [PrintedLine(text, Toned("but ", "doubtful")) for text in answer.warnings[:1]]
+    left = room - loudness.told - len(written) - hint - len(following)
+    for head, each in ((3, 2), (2, 2), (2, 1), (1, 1)):
+        first = _folded(PrintedLine(answer.head), head, console) if answer.head else []
+        others = [text for line in (*answer.lines, *warned) for text in _folded(line, each, console)]
+        if len(first) + len(others) <= left:
+            break
+    _print(first, console)
+    rows = 0 if answer.table is None else _print_table(answer.table, console)
+    _print(others, console)
+    _print(map(words, written), console)
     if hint:
-        others = len(answer.warnings) - 1
-        more = [f"{n} more {what}" for n, what in ((left, "rows"), (others, "warnings")) if n > 0]
-        console.print(words(f"--details prints {' and '.join([*more, 'all results'])}."), style="dim", soft_wrap=True)
-    if answer.following:
-        for text in _command(answer.following, console.width):
-            console.print(text, markup=False, soft_wrap=True)  # a mark-up would double the backslashes
+        hidden = ((rows, "rows"), (len(answer.warnings) - 1, "warnings"))
+        more = [*(f"{n} more {what}" for n, what in hidden if n > 0), "all results"]
+        console.print(words(f"--details prints {' and '.join(more)}."), style="dim", soft_wrap=True)
+    for text in following:
+        console.print(text, markup=False, soft_wrap=True)  # a mark-up would double the backslashes
 
 
 def print_folded(line: PrintedLine, lines: int, console: Console, more: str = "") -> None:
-    """Print a line of text, in at most `lines` lines of the terminal."""
+    """Print a line of text, in at most `lines` lines of the terminal, before an answer."""
+    folded = _folded(line, lines, console, more)
+    loudness.told += len(folded)
+    _print(folded, console)
+
+
+def _folded(line: PrintedLine, lines: int, console: Console, more: str = "") -> list[str]:
+    """Return a line of text as marked lines of the terminal."""
     mark = line.mark or Toned("", "strong")
-    first, *rest = fold(f"{mark}{line.text}", lines, console.width, more) or [""]
-    console.print(f"{marked(mark)}{words(first.removeprefix(mark))}", soft_wrap=True)
-    for text in rest:
-        console.print(words(text), soft_wrap=True)
+    first, *rest = fold(f"{mark}{line.text}", lines, console.width, more)
+    return [f"{marked(mark)}{words(first.removeprefix(mark))}", *map(words, rest)]
+
+
+def _print(folded: Iterable[str], console: Console) -> None:
+    for text in folded:
+        console.print(text, soft_wrap=True)
 
 
 def _command(command: Sequence[str], width: int) -> list[str]:

@@ -3,13 +3,14 @@
 from pathlib import Path
 
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import Answer, print_answer
+from thermocomp.cli.answers import LINES, Answer, print_answer, print_folded
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
+from thermocomp.report.layout import PrintedLine
 from thermocomp.virtual.commands.simulate import simulate
 
 
@@ -40,7 +41,8 @@ def demo(
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
     if not json:
-        console.print("A virtual machine tool runs a drift test; five methods are judged on unseen thermal cycles.")
+        intro = "A drift test of a virtual machine tool, and five methods on unseen thermal cycles:"
+        print_folded(PrintedLine(intro), 2, console)
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=True)
     compare([recording], output=report, overwrite=overwrite, json=json, part=True)
     code: int = fit([recording], output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
@@ -50,5 +52,5 @@ def demo(
             files=[recording, report, model],
             following=("thermocomp", "explain", str(model)),
         )
-        print_answer(told, console, hint=not loudness.details)
+        print_answer(told, console, hint=not loudness.details, room=2 * LINES)
     return code
