@@ -10,7 +10,6 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from thermocomp.cli import loudness
 from thermocomp.cli.terminal import ROW_STYLES, marked, words
 from thermocomp.core.explained import Explanation
 from thermocomp.core.shown import shorten
@@ -18,6 +17,8 @@ from thermocomp.report.layout import Layout, PrintedLine, Toned
 
 #: largest number of lines, and of lines of the table without its heading
 LINES, ROWS = 12, 25
+#: lines left for what is printed before the answer: a data-quality problem, and the progress of the first minutes
+BEFORE = 3
 #: largest length of a word in a cell [characters]
 WORD = 26
 #: number of names listed before the others are only counted
@@ -102,7 +103,7 @@ def count_others(number: int) -> str:
     return f" ({number} more: --details)" if number else ""
 
 
-def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: int = LINES) -> None:
+def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: int = LINES - BEFORE) -> None:
     """Print an answer.
 
     Parameters
@@ -112,14 +113,14 @@ def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: i
     hint : bool
         Say that ``--details`` prints more.
     room : int
-        Largest number of lines, with those printed on stderr before.
+        Largest number of lines.
     """
     written = [f"Written: {', '.join(map(str, answer.files))}"] if answer.files else []
     if len(answer.files) > 1:  # a single path is never cut
         written = fold(written[0], 2, console.width)
     following = _command(answer.following, console.width) if answer.following else []
     warned = [PrintedLine(text, Toned("but ", "doubtful")) for text in answer.warnings[:1]]
-    left = room - loudness.told - len(written) - hint - len(following)
+    left = room - len(written) - hint - len(following)
     for head, each in ((3, 2), (2, 2), (2, 1), (1, 1)):
         first = _folded(PrintedLine(answer.head), head, console) if answer.head else []
         others = [text for line in (*answer.lines, *warned) for text in _folded(line, each, console)]
@@ -139,9 +140,7 @@ def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: i
 
 def print_folded(line: PrintedLine, lines: int, console: Console, more: str = "") -> None:
     """Print a line of text, in at most `lines` lines of the terminal, before an answer."""
-    folded = _folded(line, lines, console, more)
-    loudness.told += len(folded)
-    _print(folded, console)
+    _print(_folded(line, lines, console, more), console)
 
 
 def _folded(line: PrintedLine, lines: int, console: Console, more: str = "") -> list[str]:

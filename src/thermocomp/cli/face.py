@@ -14,7 +14,7 @@ from docstring_parser import DocstringStyle, parse
 
 import thermocomp
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import LINES, Answer, print_answer
+from thermocomp.cli.answers import BEFORE, LINES, Answer, print_answer
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.exits import STDIN
 from thermocomp.cli.jsonoutput import print_json
@@ -41,8 +41,8 @@ ON_A_LINE: dict[str, Any] = {
     "starts": Beginning,
     "limits": CompensatorOptions,
 }
-#: lines that follow the answer of a command that another command calls
-FOLLOWING = 4
+#: lines before and after the answer of a command that another command calls
+OTHERS = 6
 #: parameters without an option, because the command itself displays their content
 SHOWN = ("progress",)
 #: function that returns the files written for an output and given options
@@ -111,7 +111,9 @@ class CommandFace:
 
         def show() -> None:
             told = replace(made(), files=(), following=()) if self.part else made()
-            print_answer(told, console, hint=not (self.part or loudness.details), room=LINES - FOLLOWING * self.part)
+            print_answer(
+                told, console, hint=not (self.part or loudness.details), room=LINES - (OTHERS if self.part else BEFORE)
+            )
             if loudness.details:
                 console.print()
                 details()

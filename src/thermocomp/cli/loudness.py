@@ -17,9 +17,8 @@ FLAGS = {
     "unexpected error.",
 }
 
-#: options of the current command line, and number of lines printed before its answer
+#: options of the current command line
 details = quiet = verbose = False
-told = 0
 
 
 def taken_off(words: Sequence[str]) -> list[str]:
@@ -30,9 +29,8 @@ def taken_off(words: Sequence[str]) -> list[str]:
     InputError
         --quiet and --verbose are given together.
     """
-    global details, quiet, verbose, told  # noqa: PLW0603 - one process runs one command line
+    global details, quiet, verbose  # noqa: PLW0603 - one process runs one command line
     details, quiet, verbose = (flag in words for flag in FLAGS)
-    told = 0
     if quiet and verbose:
         quiet = verbose = False
         raise InputError("--quiet and --verbose exclude each other: choose one")

@@ -102,7 +102,6 @@ class _Lines:
         took = time.monotonic() - self._begun
         if not self._silent and took >= self._next:
             self._next = LATER * took
-            loudness.told += 1
             print(f"{shorten(text, LONGEST)}: {done} after {took:.0f} s", file=sys.stderr, flush=True)
 
 

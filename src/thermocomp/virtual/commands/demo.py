@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import LINES, Answer, print_answer, print_folded
+from thermocomp.cli.answers import Answer, print_answer, print_folded
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
@@ -41,7 +41,7 @@ def demo(
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
     if not json:
-        intro = "A drift test of a virtual machine tool, and five methods on unseen thermal cycles:"
+        intro = "Drift test of a virtual machine tool; five methods on unseen thermal cycles:"
         print_folded(PrintedLine(intro), 2, console)
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=True)
     compare([recording], output=report, overwrite=overwrite, json=json, part=True)
@@ -52,5 +52,5 @@ def demo(
             files=[recording, report, model],
             following=("thermocomp", "explain", str(model)),
         )
-        print_answer(told, console, hint=not loudness.details, room=2 * LINES)
+        print_answer(told, console, hint=not loudness.details)
     return code
