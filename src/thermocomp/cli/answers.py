@@ -2,8 +2,7 @@
 
 import shlex
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rich import box
@@ -11,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from thermocomp.cli.terminal import ROW_STYLES, marked, words
-from thermocomp.core.explained import Explanation
 from thermocomp.core.shown import shorten
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Layout, PrintedLine, Toned
 
 #: largest number of lines, and of lines of the table without its heading
@@ -21,34 +20,6 @@ LINES, ROWS = 12, 25
 BEFORE = 3
 #: largest length of a word in a cell [characters]
 WORD = 26
-#: number of names listed before the others are only counted
-FEW = 3
-
-
-@dataclass(frozen=True, kw_only=True)
-class Answer:
-    """What a command prints without ``--details``.
-
-    Parameters
-    ----------
-    head : str
-        What to use, or what was found.
-    lines : sequence of PrintedLine
-        Below the table.
-    warnings : sequence of str
-        The worst first: only this one is printed, and the number of the others.
-    files : sequence
-        Paths of the files written.
-    following : sequence of str
-        Words of the next command; empty if there is none.
-    """
-
-    head: str
-    table: Layout | None = None
-    lines: Sequence[PrintedLine] = ()
-    warnings: Sequence[str] = ()
-    files: Sequence[object] = ()
-    following: Sequence[str] = ()
 
 
 def fold(text: str, lines: int, width: int, more: str = "") -> list[str]:
@@ -65,30 +36,6 @@ def fold(text: str, lines: int, width: int, more: str = "") -> list[str]:
         dots = " ..."
 
 
-def few(names: Sequence[str]) -> str:
-    """Return the first names, and the number of the others, as text."""
-    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
-    return ", ".join(names[:FEW]) + more
-
-
-def spares(wanted: Mapping[str, str]) -> list[PrintedLine]:
-    """Return a line about the sensors that want a spare, each with the reason."""
-    first = next((f" ({name}: {why})" for name, why in wanted.items()), "none")
-    return [PrintedLine(f"Sensors that want a spare: {few(list(wanted))}{first}.")]
-
-
-def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
-    """Return a line about the sensors of models that want a spare."""
-    if not any(s.watched for e in models for s in e.sensors):
-        return [PrintedLine("Sensors are not monitored: a wrong value is not detected.")]
-    return spares({s.name: s.spare for e in models for s in e.sensors if s.spare})
-
-
-def in_unit(target: str, unit: str) -> str:
-    """Return the name of a target, with its unit unless that is um."""
-    return target if unit == "um" else f"{target} [{unit}]"
-
-
 def free(name: str) -> Path:
     """Return a path of the current folder that does not exist: the name, or the name with a number."""
     path, number = Path(name), 1
@@ -103,12 +50,12 @@ def count_others(number: int) -> str:
     return f" ({number} more: --details)" if number else ""
 
 
-def print_answer(answer: Answer, console: Console, *, hint: bool = True, room: int = LINES - BEFORE) -> None:
+def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, room: int = LINES - BEFORE) -> None:
     """Print an answer.
 
     Parameters
     ----------
-    answer : Answer
+    answer : CommandAnswer
     console : Console
     hint : bool
         Say that ``--details`` prints more.

@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from thermocomp.api.results import Assessed
-from thermocomp.cli import judged
 from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_items
-from thermocomp.report import printed
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:assess", writes=".html", forms={"model": Path})
@@ -28,7 +27,7 @@ def assess(found: Assessed, face: CommandFace) -> int:
     face.write(found.report)
     face.answer(
         found.to_dict,
-        lambda: judged.assess(found, face.files, _following(found, face)),
+        lambda: judged.assess(found.judged, found.recordings, face.files, _following(found, face)),
         lambda: print_items(printed.assess(found.judged, found.recordings), console),
     )
     before = {m.honest_error.word for m in found.judged.models if m.honest_error is not None}

@@ -7,11 +7,11 @@ from typing import Any
 from rich.console import Console
 
 from thermocomp.api.check import CheckedRecordings
-from thermocomp.cli.answers import Answer
 from thermocomp.cli.terminal import marked, print_table, words
 from thermocomp.recordings.checks.findings import SEVERITIES, Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout, Toned
 
 _TONES = {"trouble": "grave", "warning": "doubtful", "info": "soft"}
@@ -27,7 +27,7 @@ def show_check(found: CheckedRecordings, console: Console) -> None:
         _show(r, mine, content, console)
 
 
-def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Sequence[str]) -> Answer:
+def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Sequence[str]) -> CommandAnswer:
     """Return the answer of ``check``: the recordings, the worst first, and the worst finding."""
     contents = sorted(found.to_dict()["recordings"], key=lambda r: _GRADES.index(r["worst"]))
     named = [(f, f"{r.name}: " if len(contents) > 1 else "") for r, fs in _pairs(found) for f in fs]
@@ -38,7 +38,7 @@ def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Seq
         f"{len(contents)} recording(s), {temperatures} temperatures, {displacements} displacements, "
         f"{sum(len(r['cycles']) for r in contents)} thermal cycles: {len(bad) or 'no'} problem(s) found."
     )
-    return Answer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
+    return CommandAnswer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
 
 
 def _pairs(found: CheckedRecordings) -> list[tuple[Recording, Sequence[Finding]]]:

@@ -1,12 +1,11 @@
 """`thermocomp compare`: comparison of methods on unseen data."""
 
 from thermocomp.api.results import Compared
-from thermocomp.cli import judged
 from thermocomp.cli.answers import free
 from thermocomp.cli.exits import STOPPED
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_items
-from thermocomp.report import printed
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:compare", writes=".html")
@@ -27,7 +26,7 @@ def compare(found: Compared, face: CommandFace) -> int:
     face.write(found.report)
     face.answer(
         found.to_dict,
-        lambda: judged.comparison(found, face.files, _following(found, face)),
+        lambda: judged.comparison(found.comparison, face.files, _following(found, face)),
         lambda: print_items(printed.comparison(found.comparison), console),
     )
     if found.comparison.left:

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from thermocomp.cli.answers import Answer, few, free, in_unit, spares_of
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.explained import Explanation, Explanations
+from thermocomp.report.answer import CommandAnswer, few, in_unit, spares_of
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 
 
@@ -28,13 +29,13 @@ def _print(found: Explanations) -> None:
         console.print(words(line), soft_wrap=True)
 
 
-def _answer(models: Sequence[Explanation], face: CommandFace) -> Answer:
+def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
     accepted = [e.target for e in models if e.word.startswith("accepted")]
     inputs = {s.name: s.quantity for e in models for s in e.sensors}
     heat = sum(quantity == "temperature" for quantity in inputs.values())
     what = [f"{heat} temperatures", *(name for name, quantity in inputs.items() if quantity != "temperature")]
     past = "present and past values" if any(e.remembers for e in models) else "present values only"
-    return Answer(
+    return CommandAnswer(
         head=f"{len(models)} model(s) of {' and '.join(what)}, {past}; {len(accepted)} may run. RMS on unseen "
         "cycles; leans on: largest contributions of inputs; if lost: RMS without the worst one.",
         table=Layout(_COLUMNS, models),

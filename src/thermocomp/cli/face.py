@@ -14,7 +14,7 @@ from docstring_parser import DocstringStyle, parse
 
 import thermocomp
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import BEFORE, LINES, Answer, print_answer
+from thermocomp.cli.answers import BEFORE, LINES, print_answer
 from thermocomp.cli.beginning import Beginning
 from thermocomp.cli.exits import STDIN
 from thermocomp.cli.jsonoutput import print_json
@@ -25,6 +25,7 @@ from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
 from thermocomp.core.plugins import find_plugins
+from thermocomp.report.answer import CommandAnswer
 
 #: types of parameters on the command line, where Python accepts more types than a command line can express; a group of
 #: options has a method `value`, which returns the argument of the verb
@@ -105,7 +106,7 @@ class CommandFace:
             printer()
 
     def answer(
-        self, content: Callable[[], dict[str, Any]], made: Callable[[], Answer], details: Callable[[], object]
+        self, content: Callable[[], dict[str, Any]], made: Callable[[], CommandAnswer], details: Callable[[], object]
     ) -> None:
         """Print a result as JSON, or its answer, with ``--details`` followed by all results."""
 

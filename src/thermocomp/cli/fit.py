@@ -1,10 +1,9 @@
 """`thermocomp fit`: a model with its honest error, in a file."""
 
 from thermocomp.api.results import FittedModels
-from thermocomp.cli import judged
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_items
-from thermocomp.report import printed
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
@@ -24,7 +23,7 @@ def fit(found: FittedModels, face: CommandFace) -> int:
     face.write(found.save)
     face.answer(
         lambda: {"file": str(face.output), **found.to_dict()},
-        lambda: judged.fit(found, face.files, face.following("explain", model=face.output)),
+        lambda: judged.fit(found.fitted, face.files, face.following("explain", model=face.output)),
         lambda: print_items(printed.fit(found.fitted), console),
     )
     return 1 if any(a.word == "refused" for a in found.fitted.comparison.overall()) else 0

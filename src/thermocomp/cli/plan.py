@@ -5,10 +5,11 @@ from pathlib import Path
 
 from thermocomp.api.plan import EVERY, Planned, RunningTest
 from thermocomp.api.testprogram import Dialect, picture_of, sheet_of
-from thermocomp.cli.answers import Answer, free
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout
 
 #: number of tests shown without ``--details``
@@ -60,7 +61,7 @@ def plan(
     """
     content = {"trouble": face.trouble, "expected_um": None, "candidates": [], "curve": None, "running": None}
     if isinstance(found, RunningTest):
-        running_test = Answer(head=found.words, table=_states(found))
+        running_test = CommandAnswer(head=found.words, table=_states(found))
         face.answer(lambda: {**content, "running": found.to_dict(), "files": []}, lambda: running_test, lambda: None)
         return 0 if found.may_stop else 1
     files = [] if face.output is None else files_of(face.output)
@@ -85,7 +86,7 @@ def _states(found: RunningTest) -> Layout:
     return Layout(columns, found.states)
 
 
-def _answer(found: Planned, files: list[Path], face: CommandFace) -> Answer:
+def _answer(found: Planned, files: list[Path], face: CommandFace) -> CommandAnswer:
     columns = (
         Column("next test", lambda c: c.trial.words),
         Column("expected gain", lambda c: c.gain, ".2f", "um"),
@@ -93,7 +94,9 @@ def _answer(found: Planned, files: list[Path], face: CommandFace) -> Answer:
     )
     followed = () if files else face.following("plan", output=free("next.ngc"))
     shown = found.plan.candidates[:SHOWN]
-    return Answer(head=str(replace(found, trouble=())), table=Layout(columns, shown), files=files, following=followed)
+    return CommandAnswer(
+        head=str(replace(found, trouble=())), table=Layout(columns, shown), files=files, following=followed
+    )
 
 
 def _show(found: Planned) -> None:

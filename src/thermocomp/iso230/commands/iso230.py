@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from thermocomp.cli.answers import Answer, free
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.reading import read_recordings
 from thermocomp.cli.terminal import console, make_console, print_table, words
@@ -15,6 +15,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.iso230 import tables
 from thermocomp.iso230.thermaltest import TITLES
 from thermocomp.iso230.verbs import Evaluated
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout, laid_out
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def iso230(found: Evaluated, face: CommandFace) -> int:
     return 0
 
 
-def _answer(found: Evaluated, face: CommandFace) -> Answer:
+def _answer(found: Evaluated, face: CommandFace) -> CommandAnswer:
     kinds = [f"{t.name}: {TITLES[t.kind]}" for t in found.thermal]
     axes = [" ".join(part for part in ("axis", r.test.axis, r.test.state) if part) for r in found.positioned]
     curves = [(t, c) for t in found.thermal for c in (*t.curves, *t.tilts, *(x.length for x in t.targets))]
@@ -80,7 +81,7 @@ def _answer(found: Evaluated, face: CommandFace) -> Answer:
         *(Column(f"{what} {key}", attrgetter(key), ".2f") for key, what in _VALUES.items()),
         Column("unit", lambda r: r.test.unit),
     )
-    return Answer(
+    return CommandAnswer(
         head="; ".join([*kinds, *(f"positioning of {axis}" for axis in axes)]) + ".",
         table=Layout(thermal, curves) if curves else Layout(positioning, found.positioned),
         warnings=[*(n for t in found.thermal for n in t.notes), *(n for r in found.positioned for n in r.notes)],

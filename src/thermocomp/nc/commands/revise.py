@@ -9,7 +9,7 @@ from pathlib import Path
 from cyclopts import Group, Parameter
 
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import Answer, print_answer
+from thermocomp.cli.answers import print_answer
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import show_share
@@ -21,6 +21,7 @@ from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
 from thermocomp.nc.revision.thermaloptions import Drifting, Starting
 from thermocomp.nc.rewrite.course import Bound
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout, PrintedLine
 
 #: minimum number of lines for which a time per line is reported
@@ -102,13 +103,13 @@ def revise(
     return 0 if done.written else 1
 
 
-def _answer(job: Job, done: Done, notes: Sequence[str]) -> Answer:
+def _answer(job: Job, done: Done, notes: Sequence[str]) -> CommandAnswer:
     revision, proof = job.revision, done.proof
     changed = f"{_many(revision.changed, 'line')} of {revision.lines:,} changed"
     said = (
         [] if proof is None else [f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')} as meant."]
     )
-    return Answer(
+    return CommandAnswer(
         head=f"{job.program}: {changed if done.written else outcome.explain_nothing(job, done)}; runs "
         f"{outcome.duration(revision.seconds)}; {_spindle(job)}.",
         table=_bounds(done.bounds),

@@ -3,13 +3,14 @@
 from pathlib import Path
 
 from thermocomp.cli import loudness
-from thermocomp.cli.answers import Answer, print_answer, print_folded
+from thermocomp.cli.answers import print_answer, print_folded
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import PrintedLine
 from thermocomp.virtual.commands.simulate import simulate
 
@@ -47,7 +48,7 @@ def demo(
     compare([recording], output=report, overwrite=overwrite, json=json, part=True)
     code: int = fit([recording], output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
     if not json:
-        told = Answer(
+        told = CommandAnswer(
             head="The model file has 'averaged', fitted to all cycles.",
             files=[recording, report, model],
             following=("thermocomp", "explain", str(model)),

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from thermocomp.cli.answers import Answer, fold, free
+from thermocomp.cli.answers import fold, free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout
 from thermocomp.virtual.datasets import find_experiment
 from thermocomp.virtual.protocol import Experiment
@@ -72,7 +73,7 @@ def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, li
     return 0
 
 
-def _answer(files: Mapping[Path, Recording], face: CommandFace) -> Answer:
+def _answer(files: Mapping[Path, Recording], face: CommandFace) -> CommandAnswer:
     columns = (
         Column("written", lambda item: item[0].name),
         Column("rows", lambda item: len(item[1]), ">"),
@@ -82,21 +83,23 @@ def _answer(files: Mapping[Path, Recording], face: CommandFace) -> Answer:
         Column("cycles", lambda item: len(item[1].cycles), ">"),
     )
     name = face.given["experiment"]
-    return Answer(
+    return CommandAnswer(
         head=f"{name}: {len(files)} recording(s) of the virtual machine.",
         table=Layout(columns, list(files.items())),
         following=face.following("check", recordings=list(files)),
     )
 
 
-def _list(experiments: list[Experiment]) -> Answer:
+def _list(experiments: list[Experiment]) -> CommandAnswer:
     columns = (
         Column("experiment", lambda e: e.name),
         Column("tests", lambda e: len(e.tests), ">"),
         Column("description", lambda e: fold(e.description, 1, SHORT)[0]),
     )
     following = ("thermocomp", "simulate", experiments[0].name, "-o", str(free(f"{experiments[0].name}.csv")))
-    return Answer(head=f"{len(experiments)} experiments.", table=Layout(columns, experiments), following=following)
+    return CommandAnswer(
+        head=f"{len(experiments)} experiments.", table=Layout(columns, experiments), following=following
+    )
 
 
 def _show_experiments(experiments: list[Experiment]) -> None:

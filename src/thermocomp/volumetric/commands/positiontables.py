@@ -6,10 +6,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from thermocomp.cli.answers import Answer
 from thermocomp.cli.terminal import mark, marked, print_table, words
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import NOT_TAKEN
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout, PrintedLine, Toned, verdict
 from thermocomp.volumetric.judging.position import PositionStudy
 from thermocomp.volumetric.models.positionoptions import Setting
@@ -22,7 +22,7 @@ FEW, WORST = 12, 5
 FORMULA = 300
 
 
-def answer_positioned(result: Positioned, files: Sequence[Path], following: Sequence[str]) -> Answer:
+def answer_positioned(result: Positioned, files: Sequence[Path], following: Sequence[str]) -> CommandAnswer:
     """Return the answer of ``position``: each component, on unseen profiles."""
     found = result.found
     accepted = [f.fit.model.target for f in found if f.assessment.accepted]
@@ -41,7 +41,7 @@ def answer_positioned(result: Positioned, files: Sequence[Path], following: Sequ
         Column("verdict", _verdict),
     )
     notes = [note for mine in result.tests for t in mine for note in t.states.notes if note.startswith(NOT_TAKEN)]
-    return Answer(
+    return CommandAnswer(
         head=f"{len(accepted)} of {len(found)} component(s) may run. Errors over all points of unseen profiles, judged "
         f"on: {found[0].assessment.protocol}.",
         table=Layout(columns, found),

@@ -3,10 +3,11 @@
 from functools import partial
 from pathlib import Path
 
-from thermocomp.cli.answers import Answer, free
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.reading import read_one
 from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import PrintedLine
 from thermocomp.volumetric.report import volumetric_tables as told
 from thermocomp.volumetric.verbs import VolumetricErrors
@@ -36,12 +37,12 @@ def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
     return 0
 
 
-def _answer(found: VolumetricErrors, face: CommandFace) -> Answer:
+def _answer(found: VolumetricErrors, face: CommandFace) -> CommandAnswer:
     study = found.study
     codes = {"never judged on unseen cycles": told.untested(study), "unproven": told.unproven(study)}
     known = [c["code"] for c in told.listed(study) if c["source"] != "nothing"]
     missing = f"an input is missing in {study.missing} rows, where the previous state is held"
-    return Answer(
+    return CommandAnswer(
         head=told.headline(study) + "." if found.volume else f"The tool at {told.said(study.course.point)}.",
         table=told.contributions(study, point=True) if found.point else told.volume(study),
         lines=[PrintedLine(f"Known: {len(known)} components; all others are assumed to be zero.")],

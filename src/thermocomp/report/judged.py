@@ -2,27 +2,30 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from thermocomp.api.results import Assessed, Compared, FittedModels
-from thermocomp.cli.answers import Answer, in_unit, spares, spares_of
 from thermocomp.core.explained import DEAR, explain_all
 from thermocomp.core.starting import describe_offsets
+from thermocomp.judging.assessing import Judged
+from thermocomp.judging.budget import Budget
+from thermocomp.judging.choice import Choice
 from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.study import Fitted
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import summary
+from thermocomp.report.answer import CommandAnswer, in_unit, spares, spares_of
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import WORSE, describe_unlike
 
 
-def comparison(found: Compared, files: Sequence[object], following: Sequence[str]) -> Answer:
+def comparison(told: Comparison, files: Sequence[object], following: Sequence[str]) -> CommandAnswer:
     """Return the answer of ``compare``: the recommended method of each target."""
-    told = found.comparison
     best = {a.target: told.best(a.target) for a in told.overall()}
     rows = [a or _nearest(told, target) for target, a in best.items()]
     none = [a for a, (_, use) in zip(rows, best.items(), strict=True) if use is None]
     stopped = [f"stopped: {told.left} combinations of method and target were not judged"] if told.left else []
-    return Answer(
+    return CommandAnswer(
         head=summary.verdict(told),
         table=_results(rows, "use"),
         lines=[*_worst_cycle(rows), *_dear([a for a in best.values() if a is not None])],
@@ -36,12 +39,12 @@ def comparison(found: Compared, files: Sequence[object], following: Sequence[str
     )
 
 
-def fit(found: FittedModels, files: Sequence[object], following: Sequence[str]) -> Answer:
+def fit(fitted: Fitted, files: Sequence[object], following: Sequence[str]) -> CommandAnswer:
     """Return the answer of ``fit``: the models, and their errors on unseen data."""
-    told, models = found.fitted.comparison, found.fitted.models
+    told, models = fitted.comparison, fitted.models
     rows = told.overall()
     may = sum(m.accepted for m in models)
-    return Answer(
+    return CommandAnswer(
         head=f"{_list(dict.fromkeys(a.model for a in rows))}, fitted to all data: {may} of {len(models)} models may "
         f"run. Their errors are those on unseen data: {told.judging.name}.",
         table=_results(rows, "model"),
@@ -59,16 +62,18 @@ def fit(found: FittedModels, files: Sequence[object], following: Sequence[str]) 
     )
 
 
-def assess(found: Assessed, files: Sequence[object], following: Sequence[str]) -> Answer:
+def assess(
+    judged: Judged, recordings: Sequence[Recording], files: Sequence[object], following: Sequence[str]
+) -> CommandAnswer:
     """Return the answer of ``assess``: the errors here, beside those on unseen data when the models were fitted."""
-    judged, rows = found.judged, found.judged.overall()
+    rows = judged.overall()
     words: dict[str, list[str]] = {}
     for a in rows:
         words.setdefault(a.word, []).append(a.target)
-    logs = find_faults(judged, found.recordings)
+    logs = find_faults(judged, recordings)
     fitted = {m.target: m.honest_error for m in judged.models if m.honest_error is not None}
     robust = [(a, a.robustness) for a in rows if a.robustness is not None]
-    return Answer(
+    return CommandAnswer(
         head=f"On these recordings: {'; '.join(f'{word} for {_list(t)}' for word, t in words.items())}. "
         "RMS here, and on unseen data when fitted.",
         table=_results(rows, "model", {target: h.rms for target, h in fitted.items()}),
@@ -80,7 +85,7 @@ def assess(found: Assessed, files: Sequence[object], following: Sequence[str]) -
                 if not a.accepted
             ),
             *(f"{t}: {h.word} when it was fitted, {h.why}" for t, h in fitted.items() if "accepted" not in h.word),
-            *describe_faults(logs, found.recordings),
+            *describe_faults(logs, recordings),
             *describe_held(judged, logs),
             *(f"{name}: {describe_offsets(off)}" for name, off in judged.offsets.items()),
             *(f"{a.target}: {r.harm}" for a, r in robust if r.harm),
@@ -98,6 +103,27 @@ def assess(found: Assessed, files: Sequence[object], following: Sequence[str]) -
         ],
         files=files,
         following=following,
+    )
+
+
+def choices(found: Sequence[Choice], files: Sequence[object], following: Sequence[str]) -> CommandAnswer:
+    """Return the answer of ``select``: the sensors to use, and the errors with them."""
+    chosen = [c for c in found if c.sensors and not c.failure]
+    heads = dict[tuple[str, ...], list[str]]()
+    for c in chosen:
+        heads.setdefault(c.sensors, []).append(c.target)
+    said = [f"Use {', '.join(sensors)} ({len(sensors)}) for {', '.join(of)}" for sensors, of in heads.items()]
+    return CommandAnswer(
+        head="; ".join(said or [f"No set of sensors for {', '.join(c.target for c in found)}"]) + ".",
+        table=_selected(found),
+        lines=[PrintedLine(f"Why: {c.reason}") for c in chosen[:1]],
+        warnings=[
+            *(f"{c.target}: {c.reason}" for c in found if c.failure),
+            # the first note on a budget is its rule
+            *dict.fromkeys(note for c in found for note in c.notes[isinstance(c.details, Budget) :]),
+        ],
+        files=files,
+        following=following if chosen else (),
     )
 
 
@@ -153,3 +179,17 @@ def _rejected(rows: Sequence[Assessment]) -> list[str]:
 def _list(names: Iterable[str]) -> str:
     *most, last = map(str, names)
     return f"{', '.join(most)} and {last}" if most else last
+
+
+def _selected(choices: Sequence[Choice]) -> Layout:
+    """Return the error of each target with the selected sensors and with all, or the sensors of each target."""
+    budget = choices[0].details
+    if not isinstance(budget, Budget) or (best := budget.recommended()) is None:
+        columns = (Column("target", lambda c: c.target), Column("sensors", lambda c: ", ".join(c.sensors)))
+        return Layout(columns, choices)
+    model, errors = budget.models.index(best[0]), budget.of_targets()
+    found = (errors[model, best[1]], errors[model, -1], budget.none_of_targets())
+    rows = [(target, *map(float, mine), best[0]) for target, *mine in zip(budget.targets, *found, strict=True)]
+    headings = (f"RMS with {budget.sizes[best[1]]}", f"with all {budget.sizes[-1]}", "instead of")
+    numbers = (Column(heading, k, ".2f") for k, heading in enumerate(headings, start=1))
+    return Layout((Column("target", 0), *numbers, Column("model", 4)), rows)
