@@ -137,7 +137,7 @@ def test_rezeroed_and_known(folder: Path, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_cold_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["assess", str(folder / "model.json"), str(folder / "whole.csv")]) == 0
+    assert run(["assess", str(folder / "model.json"), str(folder / "whole.csv"), "--details"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     assert (
         "Initial state of whole: cold (zeroed at its start, at rest); assumed, since the displacements begin near zero"
@@ -194,7 +194,7 @@ def test_fit_and_compare_go_on(folder: Path, capsys: pytest.CaptureFixture[str])
     content = json.loads(capsys.readouterr().out)
     assert content["starts"][0]["start"] == "continued"
     assert content["results"][0]["n_rows"] == round(0.4 * (400 - ROW))
-    assert run(["compare", b, *study, "--models", "ols", "--start", "rezeroed"]) == 1
+    assert run(["compare", b, *study, "--models", "ols", "--start", "rezeroed", "--details"]) == 1
     assert "was re-zeroed on a machine that continued from a" in capsys.readouterr().out
     subsets = ["--target", "z_um", "--method", "subsets", "--jobs", "1"]
     assert run(["select", b, *subsets]) == 2

@@ -13,7 +13,7 @@ from thermocomp.cli import progress
 WORK = """
 import time
 from thermocomp.cli import progress
-progress.OFTEN = 0.05
+progress.OFTEN = 0.01
 with progress.show_share("proving", hidden=False) as tell:
     for k in range(10):
         time.sleep(0.02)
@@ -61,6 +61,7 @@ def test_short_or_still_work_tells_nothing(
 
 def test_steps_are_counted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(progress, "OFTEN", 0.0)
+    monkeypatch.setattr(progress, "LATER", 0.0)
     with progress.show_progress(hidden=False) as step:
         step.begin(5)
         step("fitting\x1b[31m")

@@ -77,7 +77,7 @@ def test_the_real_machine_prints_what_its_page_shows(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     recording = str(shared_data / "fl_thermal" / "recording.csv")
-    assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic"]) == 0
+    assert run(["compare", recording, "--target", "ch1_um", "ch2_um", "--models", "mra", "dynamic", "--details"]) == 0
     assert_printed(page_blocks("real_machine.rst")[1], capsys.readouterr().out)
 
 

@@ -33,8 +33,9 @@ def test_every_method_for_people_and_programs(
     page = tmp_path / "sensors.html"
     line = ["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1"]
     line += ["--max-sensors", "2"] if method in ("correlation", "subsets", "ace", "pareto") else []
-    assert run([*line, "-o", str(page)]) == 0
+    assert run([*line, "-o", str(page), "--details"]) == 0
     said = capsys.readouterr().out
+    assert said.startswith("Use t")
     assert "x_um: t" in said
     assert str(page.name) in said
     text = page.read_text(encoding="utf-8")
@@ -146,7 +147,7 @@ def test_no_number_is_cut_off_on_a_narrow_terminal(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     for method in ("subsets", "grouping", "pareto"):
-        assert run(["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1"]) == 0
+        assert run(["select", str(drift), "--target", "x_um", "--method", method, "--jobs", "1", "--details"]) == 0
         assert "…" not in capsys.readouterr().out
 
 
@@ -157,7 +158,7 @@ def test_sensors_that_do_not_help_are_not_recommended(tmp_path: Path, capsys: py
     path, page = tmp_path / "noise.csv", tmp_path / "noise.html"
     recordings.write(replace(plain, table=plain.table.assign(x_um=noise)), path)
     line = ["select", str(path), "--target", "x_um", "--max-sensors", "2", "--jobs", "1", "--quiet"]
-    assert run([*line, "-o", str(page)]) == 1
+    assert run([*line, "-o", str(page), "--details"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "x_um: no sensor: no set of temperatures is clearly better than no compensation" in said
     assert "no set of temperatures is clearly better" in page.read_text(encoding="utf-8")

@@ -63,7 +63,7 @@ def revise(
     begun = [start] if start else []
     proof = [] if proved else ["--unproved"]
     whose = [] if "--controller" in options or not dialect else ["--controller", "linuxcnc"]
-    return run(["revise", program, *given, *begun, *proof, *whose, *options, "-o", out])
+    return run(["revise", program, *given, *begun, *proof, *whose, *options, "-o", out, "--details"])
 
 
 def table(path: str = "out.ngc.csv") -> list[dict[str, str]]:

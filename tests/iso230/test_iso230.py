@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_spindle_test_for_people_and_programs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = ["iso230", str(folder / "spindle-1.csv"), "--distance", "100 mm"]
     page = folder / "spindle.html"
-    assert run([*line, "-o", str(page)]) == 0
+    assert run([*line, "-o", str(page), "--details"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Thermal distortion caused by the rotating spindle" in said
     assert "spindle at 2600 1/min; 4 h, cool-down 2 h; surroundings (t_air_C)" in said
@@ -95,7 +95,7 @@ def test_with_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (z,) = [c for c in curves if c["with_model"]]
     assert z["name"] == "z_um"
     assert z["with_model"]["range_run"] < 0.6 * z["range_run"]
-    assert run(["iso230", str(folder / "spindle-1.csv"), "--model", str(model)]) == 0
+    assert run(["iso230", str(folder / "spindle-1.csv"), "--model", str(model), "--details"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "z_um, with model" in said
     assert "fitted to this recording" in said
@@ -103,7 +103,7 @@ def test_with_a_model(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_positioning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "positioning.html"
-    assert run(["iso230", "--positioning", str(POSITIONING), "-o", str(page)]) == 0
+    assert run(["iso230", "--positioning", str(POSITIONING), "-o", str(page), "--details"]) == 0
     said = capsys.readouterr().out
     assert "Axis Y: accuracy, repeatability, reversal [um]" in said
     assert page.exists()
@@ -162,7 +162,7 @@ def test_the_documentation_shows_what_is_printed(title: str, folder: Path, capsy
         "Axis X: expansion [um/m]": [str(folder / "axis-1.csv")],
         "Axis Y: accuracy": ["--positioning", str(POSITIONING)],
     }[title]
-    assert run(["iso230", *command]) == 0
+    assert run(["iso230", *command, "--details"]) == 0
     printed = capsys.readouterr().out
     there, here = (text.split(title)[1].split("└")[0] for text in (shown, printed))
     assert re.sub(r"[-\d.\s]", "", there) == re.sub(r"[-\d.\s]", "", here)
@@ -177,9 +177,9 @@ def test_what_does_not_go_with_the_test_is_told(tmp_path: Path, capsys: pytest.C
     rest = tmp_path / "rest.csv"
     lines = [f"{60 * k},{20 + 0.01 * k},{0.1 * k}" for k in range(120)]
     rest.write_text("time_s,t_air_C,z_um\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    assert run(["iso230", str(rest)]) == 0
+    assert run(["iso230", str(rest), "--details"]) == 0
     assert "neither a spindle speed nor a feed was recorded" in " ".join(capsys.readouterr().out.split())
-    assert run(["iso230", str(rest), "--test", "spindle"]) == 0
+    assert run(["iso230", str(rest), "--test", "spindle", "--details"]) == 0
     assert "the recording shows no turning spindle" in " ".join(capsys.readouterr().out.split())
 
 

@@ -198,7 +198,7 @@ def test_the_command_and_python_write_the_same_page(
     recordings.write(recording, Path("failing.csv"))
     words = ["assess", "model.json", "failing.csv"]
     assert run([*words, "-o", "report.html"]) in (0, 1)
-    assert "Report: report.html" in capsys.readouterr().out
+    assert "Written: report.html" in capsys.readouterr().out
     first = Path("report.html").read_bytes()
     assert b"<h2>Sensors</h2>" in first
     assert run([*words, "-o", "report.html"]) == 2

@@ -26,7 +26,7 @@ def wide(tmp_path: Path) -> Path:
 
 def test_a_table_for_people(wide: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "eyy.json"
-    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output)]) == 0
+    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output), "--details"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "EYY: 72 profiles of 12 points along Y, 0 to 550 mm" in said
     assert "Cold profile: polynomial of order 5" in said
@@ -83,7 +83,7 @@ def test_a_refused_model_is_written_with_its_refusal(
         table[name] = table[name].where(~day, 2 * table[name].iloc[0] - table[name])
     table.to_csv(wide, index=False)
     output = tmp_path / "eyy.json"
-    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output)]) == 1
+    assert run(["position", str(wide), "--component", "EYY", "--model", "ols", "-o", str(output), "--details"]) == 1
     assert "refused EYY" in " ".join(capsys.readouterr().out.split())
     assert not positionfile.read(output)[0].slopes[0].accepted
 
@@ -153,7 +153,10 @@ def machine(tmp_path: Path) -> list[Path]:
 
 def test_all_components_in_one_file(machine: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "axes.json"
-    assert run(["position", *map(str, machine), "--component", "all", "--model", "ols", "-o", str(output)]) == 0
+    assert (
+        run(["position", *map(str, machine), "--component", "all", "--model", "ols", "-o", str(output), "--details"])
+        == 0
+    )
     said = " ".join(capsys.readouterr().out.split())
     assert "3 components, 72 profiles of each in 3 recording(s)" in said
     assert "note not taken: EYY_z600_0_um to EYY_z600_550_um" in said
@@ -177,15 +180,15 @@ def test_several_for_machines(machine: list[Path], capsys: pytest.CaptureFixture
 
 def test_settings_are_told_and_can_be_given(machine: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["position", *map(str, machine), "--component", "EYY", "--model", "ols"]
-    assert run(arguments) == 0
+    assert run([*arguments, "--details"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Determined from the profiles: --slopes 1 --no-offset --reference-position 0" in said
-    assert run([*arguments, "--slopes", "1", "--no-offset", "--reference-position", "300"]) == 1
+    assert run([*arguments, "--slopes", "1", "--no-offset", "--reference-position", "300", "--details"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "Chosen by" not in said
     assert "selected again" not in said
     assert "do not tilt about 300 mm" in said
-    assert run([*arguments, "--slopes", "0"]) == 0
+    assert run([*arguments, "--slopes", "0", "--details"]) == 0
     assert "k1 [um/m] =" not in capsys.readouterr().out
 
 
@@ -195,7 +198,7 @@ def test_long_formulas_and_many_cycles_are_shortened(
     monkeypatch.setattr(positiontables, "FORMULA", 30)
     monkeypatch.setattr(positiontables, "FEW", 2)
     monkeypatch.setattr(positiontables, "WORST", 1)
-    assert run(["position", *map(str, machine), "--component", "EYY", "--model", "ols"]) == 0
+    assert run(["position", *map(str, machine), "--component", "EYY", "--model", "ols", "--details"]) == 0
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "... and 1 more terms (see --json)" in said
     assert "standard errors" not in said

@@ -100,7 +100,7 @@ def test_without_a_recording_constants_and_profiles_are_left(
 
 def test_for_people(mill: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     machine, recording = mill
-    assert run(["volumetric", machine, "--recording", recording]) == 0
+    assert run(["volumetric", machine, "--recording", recording, "--details"]) == 0
     said = capsys.readouterr().out
     assert "Mill [7], w X' b Z Y (C1) t: " in said
     assert "4 of 32 components are known; assumed to be zero: EYX, EZX, EAX" in said
@@ -118,11 +118,11 @@ def test_for_people(mill: tuple[str, str], capsys: pytest.CaptureFixture[str]) -
 
 
 def test_a_point_alone_or_the_volume_alone(mill: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["volumetric", mill[0], "--at", "0", "0", "0"]) == 0
+    assert run(["volumetric", mill[0], "--at", "0", "0", "0", "--details"]) == 0
     said = capsys.readouterr().out
     assert "At X 0, Y 0, Z 0 mm" in said
     assert "over the work volume" not in said
-    assert run(["volumetric", mill[0], "--grid", "2"]) == 0
+    assert run(["volumetric", mill[0], "--grid", "2", "--details"]) == 0
     said = capsys.readouterr().out
     assert "At X" not in said
     assert "volume: RMS in the work volume" in " ".join(said.split())
@@ -141,7 +141,7 @@ def test_a_missing_number_holds_the_state(mill: tuple[str, str], capsys: pytest.
     assert found["rows_missing_an_input"] == 1
     error = found["course"]["error_um"]
     assert error[300] == error[299] != error[301]
-    assert run(["volumetric", machine, "--recording", recording]) == 0
+    assert run(["volumetric", machine, "--recording", recording, "--details"]) == 0
     assert "an input is missing in 1 rows" in capsys.readouterr().out
 
 
@@ -157,7 +157,7 @@ def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pyt
     )
     assert held.startswith("EYX: its profile is known for X = 0 to 300 mm, but the axis travels from 0 to 600 mm")
     page = tmp_path / "noted.html"
-    assert run(["volumetric", mill[0], "-o", str(page)]) == 0
+    assert run(["volumetric", mill[0], "-o", str(page), "--details"]) == 0
     said, written = capsys.readouterr().out, page.read_text(encoding="utf-8")
     for note in (twice, held):
         assert f"note {note}" in said
@@ -167,7 +167,7 @@ def test_notes_on_the_machine(mill: tuple[str, str], tmp_path: Path, capsys: pyt
 def test_a_page(mill: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.html"
     assert run(["volumetric", mill[0], "-o", str(page)]) == 0
-    assert "Page: " in capsys.readouterr().out
+    assert "Written: " in capsys.readouterr().out
     assert "Volumetric error of Mill [7]" in page.read_text(encoding="utf-8")
     assert run(["volumetric", mill[0], "-o", str(page)]) == 2
     assert "exists already" in capsys.readouterr().err

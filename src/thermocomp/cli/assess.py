@@ -3,8 +3,10 @@
 from pathlib import Path
 
 from thermocomp.api.results import Assessed
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.report import printed
+from thermocomp.cli.terminal import console, print_items
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:assess", writes=".html", forms={"model": Path})
@@ -23,6 +25,17 @@ def assess(found: Assessed, face: CommandFace) -> int:
         it, 2 unusable input.
     """
     face.write(found.report)
-    face.show_items(found.to_dict, printed.assess(found.judged, found.recordings), "Report")
+    face.answer(
+        found.to_dict,
+        lambda: judged.assess(found.judged, found.recordings, face.files, _following(found, face)),
+        lambda: print_items(printed.assess(found.judged, found.recordings), console),
+    )
     before = {m.honest_error.word for m in found.judged.models if m.honest_error is not None}
     return 1 if "refused" in before | {a.word for a in found.judged.overall()} else 0
+
+
+def _following(found: Assessed, face: CommandFace) -> tuple[str, ...]:
+    """Return the command that follows: export, or the plan of the next test if no model may run."""
+    if all(m.accepted for m in found.judged.models) and all(a.accepted for a in found.judged.overall()):
+        return face.following("export", recordings=None, to="c99", output=free("c99"))
+    return face.following("plan", output=free("next.ngc"))

@@ -3,7 +3,8 @@
 from functools import partial
 
 from thermocomp.api.check import CheckedRecordings
-from thermocomp.cli.checked import show_check
+from thermocomp.cli.answers import free
+from thermocomp.cli.checked import answer_check, show_check
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console
 
@@ -24,5 +25,17 @@ def check(found: CheckedRecordings, face: CommandFace) -> int:
     """
     page = None if face.output is None else str(face.output)
     face.write(found.report)
-    face.show(lambda: {**found.to_dict(), "page": page}, partial(show_check, found, face.output, console))
+    face.answer(
+        lambda: {**found.to_dict(), "page": page},
+        lambda: answer_check(found, face.files, _following(found, face)),
+        partial(show_check, found, console),
+    )
     return 1 if found.trouble else 0
+
+
+def _following(found: CheckedRecordings, face: CommandFace) -> tuple[str, ...]:
+    """Return the command that follows: compare, or map for a file that needs repair."""
+    for path, findings in zip(face.given["recordings"], found.findings, strict=True):
+        if any(f.severity == "trouble" and f.remedy is not None for f in findings):
+            return face.following("map", recording=path, output=free(f"{path.stem}.toml"))
+    return face.following("compare", output=free("report.html"))

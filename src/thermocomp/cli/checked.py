@@ -8,34 +8,54 @@ from rich.console import Console
 
 from thermocomp.api.check import CheckedRecordings
 from thermocomp.cli.terminal import marked, print_table, words
-from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.checks.findings import SEVERITIES, Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout, Toned
 
 _TONES = {"trouble": "grave", "warning": "doubtful", "info": "soft"}
-#: number of files above which each file gets one line
-MANY = 3
+#: worst finding of a recording, the most serious first
+_GRADES = (*SEVERITIES, None)
 #: number of findings of one kind printed in full; for the rest only the channels are listed
 _FULL = 4
 
 
-def show_check(found: CheckedRecordings, page: Path | None, console: Console) -> None:
-    """Print a summary and the problems of recordings; more than three get one line each."""
-    contents = found.to_dict()["recordings"]
-    if len(contents) > MANY:
-        print_table(_overview(contents), console)
-        console.print("[dim]check a single file to see all its findings, or write a page with -o[/]")
-    else:
-        for r, mine, content in zip(found.recordings, found.findings, contents, strict=True):
-            _show(r, mine, content, console)
-    if page is not None:
-        console.print(f"Page: {words(page)}", soft_wrap=True)
+def show_check(found: CheckedRecordings, console: Console) -> None:
+    """Print a summary and all problems of recordings."""
+    for r, mine, content in zip(found.recordings, found.findings, found.to_dict()["recordings"], strict=True):
+        _show(r, mine, content, console)
+
+
+def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Sequence[str]) -> CommandAnswer:
+    """Return the answer of ``check``: the recordings, the worst first, and the worst finding."""
+    contents = sorted(found.to_dict()["recordings"], key=lambda r: _GRADES.index(r["worst"]))
+    named = [(f, f"{r.name}: " if len(contents) > 1 else "") for r, fs in _pairs(found) for f in fs]
+    told = sorted(named, key=lambda x: _GRADES.index(x[0].severity))
+    bad = [f"{f.severity}: {where}{f.channel} {f.text}" + _remedy(f) for f, where in told if f.severity != "info"]
+    temperatures, displacements = (max(_count(r, q) for r in contents) for q in ("temperature", "displacement"))
+    head = (
+        f"{len(contents)} recording(s), {temperatures} temperatures, {displacements} displacements, "
+        f"{sum(len(r['cycles']) for r in contents)} thermal cycles: {len(bad) or 'no'} problem(s) found."
+    )
+    return CommandAnswer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
+
+
+def _pairs(found: CheckedRecordings) -> list[tuple[Recording, Sequence[Finding]]]:
+    return list(zip(found.recordings, found.findings, strict=True))
+
+
+def _count(recording: dict[str, Any], quantity: str) -> int:
+    return sum(c["quantity"] == quantity for c in recording["channels"])
+
+
+def _remedy(finding: Finding) -> str:
+    return "" if finding.remedy is None else f" (in a mapping: {records.remedy(finding.remedy)})"
 
 
 def _overview(recordings: Sequence[dict[str, Any]]) -> Layout:
     columns = (
-        Column("file", lambda r: r["source"] or r["name"]),
+        Column("file", lambda r: Path(r["source"]).name or r["name"]),
         Column("rows", "rows", ">", whole=True),
         Column("hours", "hours", ".2f", whole=True),
         Column("cycles", lambda r: len(r["cycles"]), ">", whole=True),

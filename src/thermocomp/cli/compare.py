@@ -1,9 +1,11 @@
 """`thermocomp compare`: comparison of methods on unseen data."""
 
 from thermocomp.api.results import Compared
+from thermocomp.cli.answers import free
 from thermocomp.cli.exits import STOPPED
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.report import printed
+from thermocomp.cli.terminal import console, print_items
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:compare", writes=".html")
@@ -22,7 +24,19 @@ def compare(found: Compared, face: CommandFace) -> int:
         keyboard (the results until then are shown).
     """
     face.write(found.report)
-    face.show_items(found.to_dict, printed.comparison(found.comparison), "Report")
+    face.answer(
+        found.to_dict,
+        lambda: judged.comparison(found.comparison, face.files, _following(found, face)),
+        lambda: print_items(printed.comparison(found.comparison), console),
+    )
     if found.comparison.left:
         return STOPPED
     return 0 if all(best is not None for best in found.best.values()) else 1
+
+
+def _following(found: Compared, face: CommandFace) -> tuple[str, ...]:
+    """Return the command that follows: fit, or the plan of the next test if no model may run."""
+    usable = any(best is not None for best in found.best.values())
+    return (
+        face.following("fit", output=free("model.json")) if usable else face.following("plan", output=free("next.ngc"))
+    )

@@ -1,10 +1,14 @@
 """`thermocomp explain`: a model file in plain words."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, words
-from thermocomp.core.explained import Explanations
+from thermocomp.core.explained import Explanation, Explanations
+from thermocomp.report.answer import CommandAnswer, few, in_unit, spares_of
+from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 
 
 @command("thermocomp.api.explain:explain", forms={"model": Path})
@@ -16,10 +20,67 @@ def explain(found: Explanations, face: CommandFace) -> int:
     int
         0 done, 2 unusable input.
     """
-
-    def show() -> None:
-        for line in str(found).split("\n"):
-            console.print(words(line), soft_wrap=True)
-
-    face.show(found.to_dict, show)
+    face.answer(found.to_dict, lambda: _answer(found.models, face), lambda: _print(found))
     return 0
+
+
+def _print(found: Explanations) -> None:
+    for line in str(found).split("\n"):
+        console.print(words(line), soft_wrap=True)
+
+
+def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
+    accepted = [e.target for e in models if e.word.startswith("accepted")]
+    inputs = {s.name: s.quantity for e in models for s in e.sensors}
+    heat = sum(quantity == "temperature" for quantity in inputs.values())
+    what = [f"{heat} temperatures", *(name for name, quantity in inputs.items() if quantity != "temperature")]
+    past = "present and past values" if any(e.remembers for e in models) else "present values only"
+    return CommandAnswer(
+        head=f"{len(models)} model(s) of {' and '.join(what)}, {past}; {len(accepted)} may run. RMS on unseen "
+        "cycles; leans on: largest contributions of inputs; if lost: RMS without the worst one.",
+        table=Layout(_COLUMNS, models),
+        lines=[*_failing(models), *spares_of(models)],
+        warnings=[f"{e.target}: {e.word}, {e.reason}" for e in models if e.target not in accepted],
+        following=face.following("export", to="c99", output=free("c99")) if accepted else (),
+    )
+
+
+def _leans(e: Explanation) -> str:
+    known = sorted((s for s in e.sensors if s.bound is not None), key=lambda s: -(s.bound or 0.0))
+    return ", ".join(f"{s.name} {s.bound:.1f}" for s in known[:2]) or few([s.name for s in e.sensors])
+
+
+def _worst_lost(e: Explanation) -> str:
+    name, rms = max(((s.name, s.lost) for s in e.sensors if s.lost is not None), key=lambda x: x[1], default=("", 0.0))
+    return name and f"{name} {rms:.2f}"
+
+
+def _failing(models: Sequence[Explanation]) -> list[PrintedLine]:
+    """Return the lines about what happens if a sensor fails."""
+    watched = [s for e in models for s in e.sensors if s.watched]
+    if not watched:
+        return []
+    held = dict.fromkeys(s.name for e in models for s in e.sensors if not s.runs_on)
+    lasting = next(t.value for t in models[0].thresholds if t.name == "fault_duration")
+    kept = f"; without {few(list(held))} the correction is held, then fades" if held else ""
+    return [
+        PrintedLine(
+            f"A missing reading is replaced at once, a wrong one {lasting / 60:g} min after it exceeds its limit, by "
+            f"its prediction from the others{kept}."
+        ),
+        PrintedLine(
+            f"Two sensors lost at once: the models run on without {min(e.pairs[1] for e in models)} of "
+            f"{max(e.pairs[0] for e in models)} pairs."
+        ),
+    ]
+
+
+_COLUMNS = (
+    Column("target", lambda e: in_unit(e.target, e.unit)),
+    Column("method", lambda e: e.method or e.family),
+    Column("RMS", lambda e: e.rms, ".2f"),
+    Column("instead of", lambda e: e.none_rms, ".2f"),
+    Column("leans on", _leans),
+    Column("if lost", _worst_lost),
+    Column("verdict", lambda e: verdict(e.word)),
+)

@@ -2,26 +2,30 @@
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from cyclopts import Parameter
 from docstring_parser import DocstringStyle, parse
 
 import thermocomp
+from thermocomp.cli import loudness
+from thermocomp.cli.answers import BEFORE, LINES, print_answer
 from thermocomp.cli.beginning import Beginning
+from thermocomp.cli.exits import STDIN
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import CompensatorOptions, LeaveOneOut
 from thermocomp.cli.progress import Steps, show_progress
 from thermocomp.cli.reading import RecordingReader, print_trouble, read_recordings
-from thermocomp.cli.terminal import console, print_items, words
+from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
-from thermocomp.report.layout import Item
+from thermocomp.core.plugins import find_plugins
+from thermocomp.report.answer import CommandAnswer
 
 #: types of parameters on the command line, where Python accepts more types than a command line can express; a group of
 #: options has a method `value`, which returns the argument of the verb
@@ -38,6 +42,8 @@ ON_A_LINE: dict[str, Any] = {
     "starts": Beginning,
     "limits": CompensatorOptions,
 }
+#: lines before and after the answer of a command that another command calls
+OTHERS = 6
 #: parameters without an option, because the command itself displays their content
 SHOWN = ("progress",)
 #: function that returns the files written for an output and given options
@@ -58,15 +64,21 @@ class CommandFace:
         Print results as JSON.
     quiet : bool
         Print nothing; for commands that call another command.
+    part : bool
+        Print neither files nor the next command; for commands that call another command.
     trouble : list of str
         Data-quality problems of the recordings.
+    given : mapping
+        Values of the command line by parameter of the verb.
     """
 
     output: Path | None = None
     overwrite: bool = False
     json: bool = False
     quiet: bool = False
+    part: bool = False
     trouble: list[str] = field(default_factory=list)
+    given: Mapping[str, Any] = field(default_factory=dict)
 
     def warn(self, lines: list[str]) -> None:
         """Print the data-quality problems of recordings on stderr, before the work."""
@@ -93,14 +105,50 @@ class CommandFace:
         else:
             printer()
 
-    def show_items(self, content: Callable[[], dict[str, Any]], items: Iterable[Item], file: str) -> None:
-        """Print a result as JSON or as text, and the path of the file written."""
-        if self.quiet or self.json:
-            self.show(content, lambda: None)
-            return
-        print_items(items, console)
-        if self.output is not None:
-            console.print(f"{file}: {words(self.output)}", soft_wrap=True)
+    def answer(
+        self, content: Callable[[], dict[str, Any]], made: Callable[[], CommandAnswer], details: Callable[[], object]
+    ) -> None:
+        """Print a result as JSON, or its answer, with ``--details`` followed by all results."""
+
+        def show() -> None:
+            told = replace(made(), files=(), following=()) if self.part else made()
+            print_answer(
+                told, console, hint=not (self.part or loudness.details), room=LINES - (OTHERS if self.part else BEFORE)
+            )
+            if loudness.details:
+                console.print()
+                details()
+
+        self.show(content, show)
+
+    @property
+    def files(self) -> list[Path]:
+        """The output file, if one is given."""
+        return [] if self.output is None else [self.output]
+
+    def following(self, name: str, **more: Any) -> tuple[str, ...]:
+        """Return the words of another command for the same recordings and options; none for standard input.
+
+        Parameters
+        ----------
+        name : str
+            Name of a command made from a verb.
+        **more
+            Further options of that command, or others instead of those given.
+        """
+        command = find_plugins("commands")[name].load()
+        found = ["thermocomp", name]
+        for option, p in inspect.signature(command).parameters.items():
+            value = {**self.given, **more}.get(option, p.default)
+            if is_group(p.annotation):
+                for f in fields(p.annotation):
+                    if is_group(type(value)) and (own := getattr(value, f.name)) != getattr(p.annotation(), f.name):
+                        found += _typed(_name_of(f.name, None), own)
+            elif p.kind is p.POSITIONAL_ONLY:
+                found += map(str, value if isinstance(value, list) else [] if value is None else [value])
+            elif value != p.default:
+                found += _typed(_name_of(option, p.annotation), value)
+        return () if str(STDIN) in found else tuple(found)
 
 
 class Verb:
@@ -238,7 +286,8 @@ def command(
         def run(*positional: Any, **named: Any) -> int:
             given = defaults | dict(zip(verb.words, positional, strict=False)) | named
             extra = {p.name: given.pop(p.name, p.default) for p in own}
-            face = CommandFace(**{f: given.pop(f) for f in ("output", "overwrite", "json", "quiet") if f in given})
+            alone = {f: given.pop(f) for f in ("output", "overwrite", "json", "quiet", "part") if f in given}
+            face = CommandFace(**alone, given=given)
             asked = next((option for option in instead if extra[option]), "")
             if asked and face.output is not None:
                 raise InputError(f"{face.output}: --{asked.strip('_')} writes no file; omit -o")
@@ -254,13 +303,13 @@ def command(
         required = needs_output and not instead
         output: Any = Path if required else Path | None
         none: Any = inspect.Parameter.empty if required else None
-        alone = [
+        written = [
             _option("output", output, none, described.get("output", ""), ["--output", "-o"]),
             _option("overwrite", bool, False, "Overwrite an existing file."),
         ]
         mine = [_option(p.name, p.annotation, p.default, described[p.name]) for p in own]
         json = _option("json", bool, False, "Print results as JSON instead of tables.")
-        parameters = [*options, *mine, *(alone if writes else []), json]
+        parameters = [*options, *mine, *(written if writes else []), json]
         run.__name__ = run.__qualname__ = show.__name__
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}
@@ -300,6 +349,19 @@ def _described(function: Callable[..., Any]) -> dict[str, str]:
             # a second paragraph is for Python alone
             found[name.strip().lstrip("*")] = " ".join((p.description or "").split("\n\n")[0].split())
     return found
+
+
+def _name_of(option: str, annotation: Any) -> str:
+    """Return the name of an option on the command line: the last of those given, such as ``-o``."""
+    names = [m.name for m in get_args(annotation)[1:] if isinstance(m, Parameter) and m.name]
+    return str([*names[0]][-1]) if names else "--" + option.strip("_").replace("_", "-")
+
+
+def _typed(name: str, value: Any) -> list[str]:
+    """Return an option with its value as words of a command line."""
+    if isinstance(value, bool):
+        return [name if value else f"--no-{name.removeprefix('--')}"]
+    return [name, *map(str, value if isinstance(value, list | tuple) else [value])]
 
 
 def _flat(values: Any) -> list[Any]:

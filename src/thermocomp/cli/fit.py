@@ -2,7 +2,8 @@
 
 from thermocomp.api.results import FittedModels
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.report import printed
+from thermocomp.cli.terminal import console, print_items
+from thermocomp.report import judged, printed
 
 
 @command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
@@ -20,5 +21,9 @@ def fit(found: FittedModels, face: CommandFace) -> int:
         0 done, 1 a component was refused, 2 unusable input.
     """
     face.write(found.save)
-    face.show_items(lambda: {"file": str(face.output), **found.to_dict()}, printed.fit(found.fitted), "Model file")
+    face.answer(
+        lambda: {"file": str(face.output), **found.to_dict()},
+        lambda: judged.fit(found.fitted, face.files, face.following("explain", model=face.output)),
+        lambda: print_items(printed.fit(found.fitted), console),
+    )
     return 1 if any(a.word == "refused" for a in found.fitted.comparison.overall()) else 0

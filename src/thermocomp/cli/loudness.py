@@ -1,4 +1,4 @@
-"""Verbosity on stderr: ``--quiet``, ``--verbose``; removed from the command line before a command parses it."""
+"""Options of all commands: ``--details``, ``--quiet``, ``--verbose``; removed before a command parses its words."""
 
 import sys
 from collections.abc import Sequence
@@ -11,13 +11,14 @@ if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
 
 FLAGS = {
+    "--details": "Print all tables, reasons and warnings below the answer.",
     "--quiet": "Print only errors on the error stream: no progress, no data-quality problems of recordings.",
     "--verbose": "Print more on the error stream: files read, current task, elapsed time; the full traceback of an "
     "unexpected error.",
 }
 
-#: verbosity of the current command line
-quiet = verbose = False
+#: options of the current command line
+details = quiet = verbose = False
 
 
 def taken_off(words: Sequence[str]) -> list[str]:
@@ -26,10 +27,10 @@ def taken_off(words: Sequence[str]) -> list[str]:
     Raises
     ------
     InputError
-        Both flags are given.
+        --quiet and --verbose are given together.
     """
-    global quiet, verbose  # noqa: PLW0603 - one process runs one command line
-    quiet, verbose = (flag in words for flag in FLAGS)
+    global details, quiet, verbose  # noqa: PLW0603 - one process runs one command line
+    details, quiet, verbose = (flag in words for flag in FLAGS)
     if quiet and verbose:
         quiet = verbose = False
         raise InputError("--quiet and --verbose exclude each other: choose one")

@@ -1,13 +1,19 @@
 """`thermocomp plan`: sufficient test length, next test, and end of a running test."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from thermocomp.api.plan import EVERY, Planned, RunningTest
 from thermocomp.api.testprogram import Dialect, picture_of, sheet_of
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout
+
+#: number of tests shown without ``--details``
+SHOWN = 5
 
 
 def files_of(program: Path) -> list[Path]:
@@ -55,16 +61,21 @@ def plan(
     """
     content = {"trouble": face.trouble, "expected_um": None, "candidates": [], "curve": None, "running": None}
     if isinstance(found, RunningTest):
-        face.show(lambda: {**content, "running": found.to_dict(), "files": []}, lambda: _show_running(found))
+        running_test = CommandAnswer(head=found.words, table=_states(found))
+        face.answer(lambda: {**content, "running": found.to_dict(), "files": []}, lambda: running_test, lambda: None)
         return 0 if found.may_stop else 1
     files = [] if face.output is None else files_of(face.output)
     if face.output is not None:
         found.write(face.output, dialect=dialect, every=probe_every, overwrite=face.overwrite)
-    face.show(lambda: {**content, **found.to_dict(), "files": list(map(str, files))}, lambda: _show(found, files))
+    face.answer(
+        lambda: {**content, **found.to_dict(), "files": list(map(str, files))},
+        lambda: _answer(found, files, face),
+        lambda: _show(found),
+    )
     return 0
 
 
-def _show_running(found: RunningTest) -> None:
+def _states(found: RunningTest) -> Layout:
     columns = (
         Column("target", lambda s: s[0]),
         Column("now", lambda s: s[1].change, ".1f", "um"),
@@ -72,11 +83,23 @@ def _show_running(found: RunningTest) -> None:
         Column("+- (k=2)", lambda s: s[1].uncertainty, ".1f", "um"),
         Column("required", lambda s: s[1].limit, ".1f", "um"),
     )
-    print_table(Layout(columns, found.states, caption="relative to the start of the run or stop"), console)
-    console.print(f"[{'green' if found.may_stop else 'yellow'}]{words(found.words)}[/]", soft_wrap=True)
+    return Layout(columns, found.states)
 
 
-def _show(found: Planned, files: list[Path]) -> None:
+def _answer(found: Planned, files: list[Path], face: CommandFace) -> CommandAnswer:
+    columns = (
+        Column("next test", lambda c: c.trial.words),
+        Column("expected gain", lambda c: c.gain, ".2f", "um"),
+        Column("new conditions", lambda c: c.news),
+    )
+    followed = () if files else face.following("plan", output=free("next.ngc"))
+    shown = found.plan.candidates[:SHOWN]
+    return CommandAnswer(
+        head=str(replace(found, trouble=())), table=Layout(columns, shown), files=files, following=followed
+    )
+
+
+def _show(found: Planned) -> None:
     columns = (
         Column("next test", lambda c: c.trial.words),
         Column("expected gain", lambda c: c.gain, ".2f", "um"),
@@ -100,6 +123,3 @@ def _show(found: Planned, files: list[Path]) -> None:
         print_table(Layout(levels, found.curve.by_cycles(), caption=none), console)
         speeds = (Column("training speeds", lambda x: x.learned, ">"), *levels[1:])
         print_table(Layout(speeds, found.curve.by_speeds()), console)
-    console.print(words(str(found)), soft_wrap=True)
-    if files:
-        console.print(f"Written: {words(', '.join(map(str, files)))}", soft_wrap=True)

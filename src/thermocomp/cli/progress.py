@@ -1,4 +1,4 @@
-"""Progress of long work on stderr: a transient bar on a terminal, else a line at intervals."""
+"""Progress of long work on stderr: a transient bar on a terminal, else a line at growing intervals."""
 
 import sys
 import time
@@ -19,10 +19,12 @@ from rich.progress import (
 
 from thermocomp.cli import loudness
 from thermocomp.cli.terminal import make_console
-from thermocomp.core.shown import replace_unprintable
+from thermocomp.core.shown import replace_unprintable, shorten
 
-#: interval of the lines without a terminal; shorter tasks print none [s]
-OFTEN = 10.0
+#: time of the first line without a terminal; each further one comes after four times as long [s]
+OFTEN, LATER = 30.0, 4.0
+#: length of the task in such a line [characters]
+LONGEST = 50
 
 _console = make_console(stderr=True)
 
@@ -93,14 +95,14 @@ class _Lines:
 
     def __init__(self, hidden: bool) -> None:
         self._silent = hidden or _console.file.isatty()
-        self._begun = self._told = time.monotonic()
+        self._begun, self._next = time.monotonic(), OFTEN
 
     def tell(self, text: str, done: str) -> None:
-        """Print the current task and the completed fraction, if the interval has elapsed."""
-        now = time.monotonic()
-        if not self._silent and now - self._told >= OFTEN:
-            self._told = now
-            print(f"{replace_unprintable(text)}: {done} after {now - self._begun:.0f} s", file=sys.stderr, flush=True)
+        """Print the current task and the completed fraction, if it is time."""
+        took = time.monotonic() - self._begun
+        if not self._silent and took >= self._next:
+            self._next = LATER * took
+            print(f"{shorten(text, LONGEST)}: {done} after {took:.0f} s", file=sys.stderr, flush=True)
 
 
 def _bar(done: ProgressColumn, hidden: bool) -> Progress:

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from thermocomp.cli import loudness
+from thermocomp.cli.answers import count_others, print_folded
 from thermocomp.cli.exits import STDIN
-from thermocomp.cli.terminal import make_console, words
+from thermocomp.cli.terminal import make_console, marked, words
 from thermocomp.core.exceptions import InputError
+from thermocomp.report.layout import PrintedLine, Toned
 
 if TYPE_CHECKING:
     from thermocomp.recordings.recording import Recording
@@ -35,9 +37,8 @@ def read_recordings(paths: list[Path], mapping: Path | None, *, tell: bool = Tru
     columns = mappings.read_mapping(mapping) if mapping is not None else None
     found = _read_all(paths, lambda named: [read_or_offer(p, columns) for p in named])
     loudness.tell_read(found)
-    for r in found if tell and not loudness.quiet else ():
-        for change in r.changed:
-            _stderr.print(f"[dim]note[/] {words(f'{r.name}: {change}')}", soft_wrap=True)
+    if tell:
+        _print_worst(Toned("note ", "soft"), [f"{r.name}: {change}" for r in found for change in r.changed])
     return found
 
 
@@ -76,7 +77,16 @@ def tell_trouble(tests: "Sequence[Recording]") -> list[str]:
 
 
 def print_trouble(lines: list[str]) -> list[str]:
-    """Print data-quality problems on stderr, and return them."""
-    for line in () if loudness.quiet else lines:
-        _stderr.print(f"[bold yellow]trouble[/] {words(line)}", soft_wrap=True)
+    """Print data-quality problems on stderr, without ``--details`` only the first, and return them."""
+    _print_worst(Toned("trouble ", "grave"), lines)
     return lines
+
+
+def _print_worst(mark: Toned, lines: Sequence[str]) -> None:
+    if loudness.quiet:
+        return
+    if loudness.details:
+        for line in lines:
+            _stderr.print(f"{marked(mark)}{words(line)}", soft_wrap=True)
+    elif lines:
+        print_folded(PrintedLine(lines[0], mark), 2, _stderr, count_others(len(lines) - 1))

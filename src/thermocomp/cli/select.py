@@ -6,7 +6,8 @@ from cyclopts import Parameter
 
 from thermocomp.api.select import Selected, SelectionSettings
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.report import printed
+from thermocomp.cli.terminal import console, print_items
+from thermocomp.report import judged, printed
 
 
 @Parameter(name="*")
@@ -35,5 +36,16 @@ def select(found: Selected, face: CommandFace) -> int:
         targets, 2 unusable input.
     """
     face.write(found.report)
-    face.show_items(found.to_dict, printed.choices(found.choices), "Page")
+    face.answer(
+        found.to_dict,
+        lambda: judged.choices(found.choices, face.files, _following(found, face)),
+        lambda: print_items(printed.choices(found.choices), console),
+    )
     return 1 if any(c.failure for c in found.choices) else 0
+
+
+def _following(found: Selected, face: CommandFace) -> tuple[str, ...]:
+    """Return the command that compares methods on the selected sensors, and the spindle speed."""
+    speeds = [r.speed.name for r in found.recordings[:1] if r.speed is not None]
+    chosen = list(dict.fromkeys(name for c in found.choices for name in c.sensors))
+    return face.following("compare", inputs=[*chosen, *speeds])

@@ -54,7 +54,8 @@ _TONES = {
     "strong": "bold",
     "chosen": "bold green",
 }
-_ROWS = {"best": "bold green", "none": "dim"}
+#: styles of highlighted rows
+ROW_STYLES = {"best": "bold green", "none": "dim"}
 
 
 def words(text: object) -> str:
@@ -106,7 +107,7 @@ def print_table(t: Layout, console: Console, **how: Any) -> None:
     for k, row in enumerate(t.rows):
         if k in t.sections:
             table.add_section()
-        table.add_row(*(marked(c.text(row)) for c in t.columns), style=_ROWS.get(t.tone(k)))
+        table.add_row(*(marked(c.text(row)) for c in t.columns), style=ROW_STYLES.get(t.tone(k)))
     console.print(table)
     if t.note:
         console.print(words(t.note), style="dim")

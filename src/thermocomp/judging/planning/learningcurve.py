@@ -75,10 +75,9 @@ class LearningCurve:
 
     @property
     def last_gain(self) -> float:
-        """Reduction of the error per further cycle [um]: negative slope over the upper half of the sizes."""
-        levels = self.by_cycles()
-        upper = levels[(len(levels) - 1) // 2 :]
-        return -float(np.polyfit([x.learned for x in upper], [x.rms for x in upper], 1)[0]) if len(upper) > 1 else 0.0
+        """Reduction of the error per cycle between the two largest numbers of training cycles [um]."""
+        levels = self.by_cycles()[-2:]
+        return (levels[0].rms - levels[1].rms) / (levels[1].learned - levels[0].learned) if len(levels) > 1 else 0.0
 
     @property
     def worth(self) -> float:
@@ -96,7 +95,10 @@ class LearningCurve:
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
         of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
-        slope = f"each of the last cycles reduced the error by {self.last_gain:.2f} um"
+        n = last.learned - levels[-2].learned if len(levels) > 1 else 1
+        way = "reduced" if self.last_gain >= 0 else "increased"
+        which = "the last cycle" if n == 1 else f"each of the last {n} cycles"
+        slope = f"{which} {way} the error by {abs(self.last_gain):.2f} um"
         if last.rms >= self.none:
             return f"{of}, {self.none:.2f} without compensation: the model does not help on unseen cycles"
         if self.enough:

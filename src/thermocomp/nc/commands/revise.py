@@ -9,6 +9,7 @@ from pathlib import Path
 from cyclopts import Group, Parameter
 
 from thermocomp.cli import loudness
+from thermocomp.cli.answers import print_answer
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import show_share
@@ -20,7 +21,8 @@ from thermocomp.nc.revision.options import Controller, Timing, Way
 from thermocomp.nc.revision.prepare import prepare_job
 from thermocomp.nc.revision.thermaloptions import Drifting, Starting
 from thermocomp.nc.rewrite.course import Bound
-from thermocomp.report.layout import Column, Layout
+from thermocomp.report.answer import CommandAnswer
+from thermocomp.report.layout import Column, Layout, PrintedLine
 
 #: minimum number of lines for which a time per line is reported
 MANY = 1000
@@ -95,8 +97,26 @@ def revise(
     if json:
         print_json(outcome.content(job, done, notes))
     else:
-        _show(job, done, notes)
+        print_answer(_answer(job, done, notes), console, hint=not loudness.details)
+        if loudness.details:
+            _show(job, done, notes)
     return 0 if done.written else 1
+
+
+def _answer(job: Job, done: Done, notes: Sequence[str]) -> CommandAnswer:
+    revision, proof = job.revision, done.proof
+    changed = f"{_many(revision.changed, 'line')} of {revision.lines:,} changed"
+    said = (
+        [] if proof is None else [f"LinuxCNC's interpreter ran both programs: {_many(proof.moves, 'move')} as meant."]
+    )
+    return CommandAnswer(
+        head=f"{job.program}: {changed if done.written else outcome.explain_nothing(job, done)}; runs "
+        f"{outcome.duration(revision.seconds)}; {_spindle(job)}.",
+        table=_bounds(done.bounds),
+        lines=[PrintedLine(f"Start: {job.begun}; {job.method}."), *map(PrintedLine, said)],
+        warnings=[*outcome.warnings(job, done), *notes, *outcome.describe_place(job, done)],
+        files=job.paths.all() if done.written else (),
+    )
 
 
 def _show(job: Job, done: Done, notes: Sequence[str]) -> None:

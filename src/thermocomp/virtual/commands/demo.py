@@ -2,12 +2,16 @@
 
 from pathlib import Path
 
+from thermocomp.cli import loudness
+from thermocomp.cli.answers import print_answer, print_folded
 from thermocomp.cli.compare import compare
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
+from thermocomp.report.answer import CommandAnswer
+from thermocomp.report.layout import PrintedLine
 from thermocomp.virtual.commands.simulate import simulate
 
 
@@ -38,11 +42,16 @@ def demo(
     recording, model, report = output / "recording.parquet", output / "model.json", output / "report.html"
     refuse_existing([recording, model, report], overwrite)
     if not json:
-        console.print("[bold]1. The virtual machine tool runs a drift test[/]")
-    simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
+        intro = "Drift test of a virtual machine tool; five methods on unseen thermal cycles:"
+        print_folded(PrintedLine(intro), 2, console)
+    simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=True)
+    compare([recording], output=report, overwrite=overwrite, json=json, part=True)
+    code: int = fit([recording], output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
     if not json:
-        console.print("\n[bold]2. Five methods, judged on unseen thermal cycles[/]")
-    compare([recording], output=report, overwrite=overwrite, json=json)
-    if not json:
-        console.print("\n[bold]3. 'averaged', fitted to all cycles and frozen[/]")
-    return fit([recording], output=model, overwrite=overwrite, quiet=json)
+        told = CommandAnswer(
+            head="The model file has 'averaged', fitted to all cycles.",
+            files=[recording, report, model],
+            following=("thermocomp", "explain", str(model)),
+        )
+        print_answer(told, console, hint=not loudness.details)
+    return code

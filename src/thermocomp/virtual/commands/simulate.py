@@ -4,13 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from thermocomp.cli.answers import fold, free
 from thermocomp.cli.face import CommandFace, command
-from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.cli.terminal import console, print_table
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
+from thermocomp.report.answer import CommandAnswer
 from thermocomp.report.layout import Column, Layout
 from thermocomp.virtual.datasets import find_experiment
 from thermocomp.virtual.protocol import Experiment
+
+#: length of a description without ``--details`` [characters]
+SHORT = 49
 
 
 def files_of(output: Path, given: Mapping[str, Any]) -> list[Path]:
@@ -51,27 +56,50 @@ def simulate(found: list[Recording] | list[Experiment], face: CommandFace, *, li
     tests = [r for r in found if isinstance(r, Recording)]
     if face.output is None:
         content = [{"name": e.name, "description": e.description, "tests": len(e.tests)} for e in experiments]
-        face.show(lambda: {"experiments": content}, lambda: _show_experiments(experiments))
+        face.answer(
+            lambda: {"experiments": content}, lambda: _list(experiments), lambda: _show_experiments(experiments)
+        )
         return 0
     from thermocomp.recordings.readers import recordings
 
     files = dict(zip(_number(face.output, len(tests)), tests, strict=True))
     for path, test in files.items():
         recordings.write(test, path, overwrite=face.overwrite)
-    face.show(
+    face.answer(
         lambda: {"recordings": [{"file": str(p), **records.recording(r, ())} for p, r in files.items()]},
-        lambda: _show(files),
+        lambda: _answer(files, face),
+        lambda: None,
     )
     return 0
 
 
-def _show(files: Mapping[Path, Recording]) -> None:
-    for path, r in files.items():
-        hours = (r.time[-1] - r.time[0]) / 3600
-        console.print(
-            f"{words(path)}: {len(r)} rows, {hours:.1f} h, {len(r.temperatures)} temperatures, "
-            f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
-        )
+def _answer(files: Mapping[Path, Recording], face: CommandFace) -> CommandAnswer:
+    columns = (
+        Column("written", lambda item: item[0].name),
+        Column("rows", lambda item: len(item[1]), ">"),
+        Column("hours", lambda item: (item[1].time[-1] - item[1].time[0]) / 3600, ".1f"),
+        Column("temperatures", lambda item: len(item[1].temperatures), ">"),
+        Column("displacements", lambda item: len(item[1].displacements), ">"),
+        Column("cycles", lambda item: len(item[1].cycles), ">"),
+    )
+    name = face.given["experiment"]
+    return CommandAnswer(
+        head=f"{name}: {len(files)} recording(s) of the virtual machine.",
+        table=Layout(columns, list(files.items())),
+        following=face.following("check", recordings=list(files)),
+    )
+
+
+def _list(experiments: list[Experiment]) -> CommandAnswer:
+    columns = (
+        Column("experiment", lambda e: e.name),
+        Column("tests", lambda e: len(e.tests), ">"),
+        Column("description", lambda e: fold(e.description, 1, SHORT)[0]),
+    )
+    following = ("thermocomp", "simulate", experiments[0].name, "-o", str(free(f"{experiments[0].name}.csv")))
+    return CommandAnswer(
+        head=f"{len(experiments)} experiments.", table=Layout(columns, experiments), following=following
+    )
 
 
 def _show_experiments(experiments: list[Experiment]) -> None:

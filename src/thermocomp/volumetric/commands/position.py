@@ -6,9 +6,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console
-from thermocomp.volumetric.commands.positiontables import show_positioned
+from thermocomp.volumetric.commands.positiontables import answer_positioned, show_positioned
 from thermocomp.volumetric.positionsettings import PositionSettings
 from thermocomp.volumetric.verbs import Positioned
 
@@ -45,5 +46,11 @@ def position(found: Positioned, face: CommandFace) -> int:
     """
     face.write(found.save)
     file = None if face.output is None else str(face.output)
-    face.show(lambda: {**found.to_dict(), "file": file}, partial(show_positioned, found, face.output, console))
+    face.answer(
+        lambda: {**found.to_dict(), "file": file},
+        lambda: answer_positioned(
+            found, face.files, () if file else face.following("position", output=free("axes.json"))
+        ),
+        partial(show_positioned, found, console),
+    )
     return 1 if any(f.assessment.verdict.word == "refused" for f in found.found) else 0

@@ -9,7 +9,8 @@ from rich.console import Console
 from thermocomp.cli.terminal import mark, marked, print_table, words
 from thermocomp.recordings.profiles import Profiles
 from thermocomp.recordings.readers.profiles import NOT_TAKEN
-from thermocomp.report.layout import Column, Layout, Toned, verdict
+from thermocomp.report.answer import CommandAnswer
+from thermocomp.report.layout import Column, Layout, PrintedLine, Toned, verdict
 from thermocomp.volumetric.judging.position import PositionStudy
 from thermocomp.volumetric.models.positionoptions import Setting
 from thermocomp.volumetric.report import records
@@ -21,14 +22,50 @@ FEW, WORST = 12, 5
 FORMULA = 300
 
 
-def show_positioned(result: Positioned, file: Path | None, console: Console) -> None:
-    """Print the results of one or several components, and the path of the model file."""
+def answer_positioned(result: Positioned, files: Sequence[Path], following: Sequence[str]) -> CommandAnswer:
+    """Return the answer of ``position``: each component, on unseen profiles."""
+    found = result.found
+    accepted = [f.fit.model.target for f in found if f.assessment.accepted]
+    worst = max(((f, c) for f in found for c in f.assessment.cycles), key=lambda x: x[1].model, default=None)
+    line = []
+    if worst is not None:
+        f, c = worst
+        told = f"{f.fit.model.target} in {c.cycle}, {c.model:.2f} {f.assessment.unit} RMS instead of {c.none:.2f}"
+        line = [PrintedLine(f"Worst cycle: {told}.")]
+    columns = (
+        Column("component", lambda f: f"{f.fit.model.target} [{f.fit.model.unit}]"),
+        Column("RMS", lambda f: f.assessment.overall.model, ".2f"),
+        Column("cold profile alone", lambda f: f.assessment.overall.geometric, ".2f"),
+        Column("instead of", lambda f: f.assessment.overall.none, ".2f"),
+        Column("largest", lambda f: f.assessment.overall.model_max, ".2f"),
+        Column("verdict", _verdict),
+    )
+    notes = [note for mine in result.tests for t in mine for note in t.states.notes if note.startswith(NOT_TAKEN)]
+    return CommandAnswer(
+        head=f"{len(accepted)} of {len(found)} component(s) may run. Errors over all points of unseen profiles, judged "
+        f"on: {found[0].assessment.protocol}.",
+        table=Layout(columns, found),
+        lines=line,
+        warnings=[
+            *(
+                f"{f.fit.model.target}: {f.assessment.verdict.word}, {f.assessment.reason}"
+                for f in found
+                if not f.assessment.accepted
+            ),
+            *(f"{f.fit.model.target}: the thermal part is omitted: {f.dropped}" for f in found if f.dropped),
+            *dict.fromkeys(notes),
+        ],
+        files=files,
+        following=following,
+    )
+
+
+def show_positioned(result: Positioned, console: Console) -> None:
+    """Print the results of one or several components."""
     if result.several:
         show_all(result.found, result.tests, result.left_open, console)
     else:
         show(result.found[0], result.tests[0], result.left_open, console)
-    if file is not None:
-        console.print(f"Model file: {words(file)}", soft_wrap=True)
 
 
 def show(found: PositionStudy, tests: Sequence[Profiles], left_open: Sequence[Setting], console: Console) -> None:

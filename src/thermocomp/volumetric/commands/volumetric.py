@@ -3,9 +3,12 @@
 from functools import partial
 from pathlib import Path
 
+from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.reading import read_one
 from thermocomp.cli.terminal import console, print_table, words
+from thermocomp.report.answer import CommandAnswer
+from thermocomp.report.layout import PrintedLine
 from thermocomp.volumetric.report import volumetric_tables as told
 from thermocomp.volumetric.verbs import VolumetricErrors
 
@@ -30,11 +33,30 @@ def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
         0 done, 2 unusable input.
     """
     face.write(found.report)
-    face.show(found.to_dict, partial(_show, found, face.output))
+    face.answer(found.to_dict, lambda: _answer(found, face), partial(_show, found))
     return 0
 
 
-def _show(found: VolumetricErrors, page: Path | None) -> None:
+def _answer(found: VolumetricErrors, face: CommandFace) -> CommandAnswer:
+    study = found.study
+    codes = {"never judged on unseen cycles": told.untested(study), "unproven": told.unproven(study)}
+    known = [c["code"] for c in told.listed(study) if c["source"] != "nothing"]
+    missing = f"an input is missing in {study.missing} rows, where the previous state is held"
+    return CommandAnswer(
+        head=told.headline(study) + "." if found.volume else f"The tool at {told.said(study.course.point)}.",
+        table=told.contributions(study, point=True) if found.point else told.volume(study),
+        lines=[PrintedLine(f"Known: {len(known)} components; all others are assumed to be zero.")],
+        warnings=[
+            *(f"{what}: {', '.join(mine)}" for what, mine in codes.items() if mine),
+            *([missing] if study.missing else []),
+            *study.notes,
+        ],
+        files=face.files,
+        following=() if face.files else face.following("volumetric", output=free("volumetric.html")),
+    )
+
+
+def _show(found: VolumetricErrors) -> None:
     study, point, volume = found.study, found.point, found.volume
     machine, recording = study.machine, study.recording
     replayed = "reference state, with constants and profiles only"
@@ -69,5 +91,3 @@ def _show(found: VolumetricErrors, page: Path | None) -> None:
         console.print(f"[yellow]note[/] {words(note)}", soft_wrap=True)
     if volume:
         console.print(f"[bold]{told.headline(study)}[/]", soft_wrap=True)
-    if page is not None:
-        console.print(f"Page: {words(page)}", soft_wrap=True)

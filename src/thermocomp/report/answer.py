@@ -1,0 +1,60 @@
+"""Answer of a command, independent of its output: what to use, how good it is, what to do next."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from thermocomp.core.explained import Explanation
+from thermocomp.report.layout import Layout, PrintedLine
+
+#: number of names listed before the others are only counted
+FEW = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandAnswer:
+    """What a command prints without ``--details``.
+
+    Parameters
+    ----------
+    head : str
+        What to use, or what was found.
+    lines : sequence of PrintedLine
+        Below the table.
+    warnings : sequence of str
+        The worst first: only this one is printed, and the number of the others.
+    files : sequence
+        Paths of the files written.
+    following : sequence of str
+        Words of the next command; empty if there is none.
+    """
+
+    head: str
+    table: Layout | None = None
+    lines: Sequence[PrintedLine] = ()
+    warnings: Sequence[str] = ()
+    files: Sequence[object] = ()
+    following: Sequence[str] = ()
+
+
+def few(names: Sequence[str]) -> str:
+    """Return the first names, and the number of the others, as text."""
+    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+    return ", ".join(names[:FEW]) + more
+
+
+def spares(wanted: Mapping[str, str]) -> list[PrintedLine]:
+    """Return a line about the sensors that want a spare, each with the reason."""
+    first = next((f" ({name}: {why})" for name, why in wanted.items()), "none")
+    return [PrintedLine(f"Sensors that want a spare: {few(list(wanted))}{first}.")]
+
+
+def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
+    """Return a line about the sensors of models that want a spare."""
+    if not any(s.watched for e in models for s in e.sensors):
+        return [PrintedLine("Sensors are not monitored: a wrong value is not detected.")]
+    return spares({s.name: s.spare for e in models for s in e.sensors if s.spare})
+
+
+def in_unit(target: str, unit: str) -> str:
+    """Return the name of a target, with its unit unless that is um."""
+    return target if unit == "um" else f"{target} [{unit}]"
