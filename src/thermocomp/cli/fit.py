@@ -5,7 +5,7 @@ from thermocomp.cli.face import CommandFace, command
 from thermocomp.report import printed
 
 
-@command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
+@command("thermocomp.api.verbs:fit", writes=".json", needs_output=True, forms={"model": list[str]})
 def fit(found: FittedModels, face: CommandFace) -> int:
     """Write and show the results.
 

@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+from thermocomp.api import verbs
 from thermocomp.cli.compare import compare
+from thermocomp.cli.face import CommandFace
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
+from thermocomp.cli.progress import show_progress
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
@@ -42,7 +45,11 @@ def demo(
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=json)
     if not json:
         console.print("\n[bold]2. Five methods, judged on unseen thermal cycles[/]")
-    compare([recording], output=report, overwrite=overwrite, json=json)
+    face = CommandFace(output=report, overwrite=overwrite, json=json)
+    with show_progress(hidden=json, warn=face.warn) as progress:
+        found = verbs.compare(recording, progress=progress)
+    compare.show(found, face)  # type: ignore[attr-defined]
     if not json:
-        console.print("\n[bold]3. 'averaged', fitted to all cycles and frozen[/]")
-    return fit([recording], output=model, overwrite=overwrite, quiet=json)
+        console.print("\n[bold]3. The recommended methods, fitted to all cycles and frozen[/]")
+    face = CommandFace(output=model, overwrite=overwrite, quiet=json)
+    return int(fit.show(found.fit(), face))  # type: ignore[attr-defined]
