@@ -171,7 +171,7 @@ def compare(
         limits=limits or Limits(),
         jobs=jobs,
     )
-    return Compared(found, ready.tests, tuple(ready.trouble), ready.samples, write)
+    return Compared(found, ready.tests, tuple(ready.trouble), ready.samples, write=write)
 
 
 def _listed(models: Any) -> list[Any]:

@@ -1,7 +1,7 @@
 """Error in use: error on unseen blocks with clean and with noisy readings, and with a sensor lost."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,9 +58,8 @@ class InUse:
         noisy = max(found.noise_rms.get("normal", (0.0,))[0] ** 2 - undisturbed**2, 0.0)
         lost = float(np.mean(list(found.lost_rms.values()))) if found.lost_rms else undisturbed
         added = max(lost**2 - undisturbed**2, 0.0)
-        return cls(
-            clean, float(np.hypot(clean, noise / found.noise * noisy**0.5)), float(np.hypot(clean, added**0.5)), **ties
-        )
+        by_noise = float(np.hypot(clean, noise / found.noise * noisy**0.5))
+        return cls(clean, by_noise, float(np.hypot(clean, added**0.5)), **ties)
 
     @property
     def rms(self) -> float:
@@ -72,7 +71,7 @@ class InUse:
         if not np.isfinite(self.clean):
             return self  # it could not be fitted
         noisy, lost = (np.sqrt(max(x**2 - self.clean**2, 0.0)) for x in (self.noisy, self.lost))
-        return InUse(clean, float(np.hypot(clean, noisy)), float(np.hypot(clean, lost)), self.sensors, self.numbers)
+        return replace(self, clean=clean, noisy=float(np.hypot(clean, noisy)), lost=float(np.hypot(clean, lost)))
 
 
 def pool(parts: Sequence[tuple[InUse, int]]) -> InUse:
@@ -80,7 +79,8 @@ def pool(parts: Sequence[tuple[InUse, int]]) -> InUse:
     rows = [n for _, n in parts]
     errors = np.square([(p.clean, p.noisy, p.lost) for p, _ in parts])
     clean, noisy, lost = np.sqrt(np.average(errors, axis=0, weights=rows)).tolist()
-    return InUse(clean, noisy, lost, max(p.sensors for p, _ in parts), max(p.numbers for p, _ in parts))
+    sensors, numbers = max(p.sensors for p, _ in parts), max(p.numbers for p, _ in parts)
+    return InUse(clean, noisy, lost, sensors=sensors, numbers=numbers)
 
 
 def least(errors: Mapping[str, InUse]) -> str:
