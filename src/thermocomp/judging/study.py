@@ -21,6 +21,7 @@ from thermocomp.judging.splits import Judging
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import deployable, expand
 from thermocomp.models.training import Trained, train
+from thermocomp.models.watching import find_watch
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 
@@ -129,16 +130,17 @@ def _write(
     """Add to each model its error on unseen data and the watch; `tested`: targets whose methods were compared."""
     everything = np.ones(len(samples), dtype=np.bool_)
     known, names = samples.only(watched), [c.name for c in samples.inputs]
-    guard = find_guard(known, everything, everything)
+    # `compare` has tested accepted models as written, with a watch of all inputs
+    done = {a.target for a in comparison.overall() if a.target in tested and a.accepted and len(watched) == len(names)}
+    guard = find_guard(known, everything, everything) if len(done) < len(written) else None
+    watch = guard.watch if guard else find_watch(known, everything)
     let = guard and guard.among([names.index(c.name) for c in known.inputs])
     models, tried = list[ErrorModel](), dict[str, Assessment]()
     for overall, trained in zip(comparison.overall(), written, strict=True):
         model = replace(trained.model, support=support_of(overall, support))
-        # `compare` tests accepted models as written, with a watch of all inputs
-        done = overall.target in tested and overall.accepted and len(watched) == len(names)
-        tried[overall.target] = overall if done else stress_written(overall, model, samples, let)
+        tried[overall.target] = overall if overall.target in done else stress_written(overall, model, samples, let)
         honest = honest_error(tried[overall.target], comparison.judging)
-        models.append(replace(model, honest_error=honest, validity=covered, watch=guard.watch if guard else None))
+        models.append(replace(model, honest_error=honest, validity=covered, watch=watch))
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
     return Fitted(
         tuple(models),
