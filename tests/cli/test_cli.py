@@ -49,6 +49,9 @@ def drift(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+FIT = ["fit", "--target", "z_um", "--model", "averaged", "--jobs", "1"]
+
+
 def printed(capsys: pytest.CaptureFixture[str]) -> Any:
     return json.loads(capsys.readouterr().out)
 
@@ -112,7 +115,7 @@ def test_compare_prints_a_table_and_writes_a_report(
 
 def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = tmp_path / "model.json"
-    assert run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"]) == 0
+    assert run([*FIT, str(drift), "-o", str(model), "--json"]) == 0
     (fitted,) = printed(capsys)["models"]
     assert fitted["verdict"] == "accepted"
     assert fitted["r_squared"] > 0.98
@@ -148,7 +151,7 @@ def test_assess_leaves_out_what_was_learned_from(
     drift: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model, copy = tmp_path / "model.json", tmp_path / "copy.csv"
-    assert run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"]) == 0
+    assert run([*FIT, str(drift), "-o", str(model), "--json"]) == 0
     capsys.readouterr()
     lines = drift.read_text(encoding="utf-8").splitlines(keepends=True)
     copy.write_text("".join(lines[:120] + lines[121:]), encoding="utf-8")
@@ -175,7 +178,7 @@ def test_what_fit_has_refused_assess_does_not_pass(
 ) -> None:
     model, other = tmp_path / "model.json", tmp_path / "other.csv"
     recordings.write(small_machine((2200.0, 1200.0), seed=3, dt=200.0), other)
-    run(["fit", str(drift), "--target", "z_um", "--jobs", "1", "-o", str(model), "--json"])
+    run([*FIT, str(drift), "-o", str(model), "--json"])
     (fitted,) = modelfile.read(model)
     assert fitted.honest_error is not None
     refused = replace(fitted.honest_error, verdict="refused", reason="worse than none in cycle 2")
@@ -264,7 +267,7 @@ def test_a_constant_target_is_refused_not_a_crash(tmp_path: Path, capsys: pytest
         "1",
     ]
     assert run([*arguments, "-o", str(tmp_path / "r.html")]) in (0, 1)
-    assert run(["fit", str(path), "--target", "z_um", "--jobs", "1", "-o", str(tmp_path / "m.json")]) in (0, 1)
+    assert run([*FIT, str(path), "-o", str(tmp_path / "m.json")]) in (0, 1)
     assert "trouble" in capsys.readouterr().err
 
 

@@ -9,12 +9,15 @@ from smallmachine import small_machine
 from thermocomp.core.exceptions import InputError
 from thermocomp.judging import splits
 from thermocomp.judging.compare import compare
-from thermocomp.judging.recommend import GROUPS, PAIRS, inner_splits
+from thermocomp.judging.do_no_harm import Verdict
+from thermocomp.judging.inuse import InUse, least
+from thermocomp.judging.recommend import GROUPS, PAIRS, inner_splits, recommend
 from thermocomp.judging.results import Rules
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import COLD
+from thermocomp.report.summary import describe_choice
 
 SIX = (1000.0, 2500.0, 1800.0, 3000.0, 1400.0, 2200.0)
 
@@ -58,22 +61,68 @@ def test_the_recommended_method_is_judged_with_its_choosing() -> None:
     assert "3 methods tried, selected again in each fold" in best.reason
 
 
-def test_without_a_recommendation_the_method_least_disturbed_by_noise_is_used() -> None:
-    """The smallest error on quiet readings may belong to the method with the largest effects of single sensors."""
-    samples = of(small_machine(SIX))
-    result = compare(samples, ["ols", "dynamic"], splits.leave_one_cycle_out(samples), rules=Rules(primary="ols"))
+def test_the_least_error_in_use_is_recommended() -> None:
+    """Root mean square of the errors with clean readings, with the noise in use, and with a sensor lost."""
+    result = compare(of(small_machine(SIX)), ["ols", "dynamic"], splits.leave_one_cycle_out(of(small_machine(SIX))))
     found = {a.model: a for a in result.overall()}
     assert all(a.accepted for a in found.values())
-    assert found["dynamic"].metric("rms") < found["ols"].metric("rms")
-    for share, method in ((0.9, "dynamic"), (1.1, "ols")):
-        a, mine = found["dynamic"], found["ols"].noisy_rms * share
-        assert a.robustness is not None
-        noisy = replace(
-            a, robustness=replace(a.robustness, noise_rms=dict.fromkeys(("uniform", "normal"), (mine, mine)))
-        )
-        best = replace(result, assessments=(found["ols"], noisy)).best("z_um")
-        assert best is not None
-        assert best.model == method
+    assert result.noise == pytest.approx(0.02, rel=0.1)  # that of the recording
+    ols, dynamic = (result.in_use(found[name]) for name in ("ols", "dynamic"))
+    r = found["dynamic"].robustness
+    assert r is not None
+    assert dynamic.clean == found["dynamic"].metric("rms")
+    assert dynamic.lost == pytest.approx(np.mean(list(r.lost_rms.values())), rel=1e-3)
+    added = (result.noise / r.noise) ** 2 * (r.noise_rms["normal"][0] ** 2 - found["dynamic"].undisturbed ** 2)
+    assert dynamic.noisy == pytest.approx(np.sqrt(dynamic.clean**2 + added))
+    assert dynamic.rms == pytest.approx(np.sqrt((dynamic.clean**2 + dynamic.noisy**2 + dynamic.lost**2) / 3))
+    assert ols.numbers < dynamic.numbers
+    best, other = result.best("z_um"), result.next_best("z_um")
+    assert best is not None
+    assert other is not None
+    assert result.in_use(best).rms < result.in_use(other).rms
+    lost = {name: 3 * result.in_use(other).rms for name in best.robustness.lost_rms}  # type: ignore[union-attr]
+    worse = replace(best, robustness=replace(best.robustness, lost_rms=lost))  # type: ignore[type-var]
+    kept = tuple(worse if a is best else a for a in result.assessments)
+    assert replace(result, assessments=kept).best("z_um") == other
+    told = describe_choice(result, "z_um")
+    assert f"error in use {result.in_use(best).rms:.2f} um (root mean square, weights 1:1:1, of " in told
+    assert told.endswith(f"; {other.model} {result.in_use(other).rms:.2f} um")
+
+
+def test_noise_counts_as_stated() -> None:
+    """The mean square that noise adds is that of the replay with the same noise: the model is linear."""
+    samples = of(small_machine(SIX))
+    judging = splits.leave_one_cycle_out(samples)
+    result = compare(samples, ["ols"], judging, rules=Rules(noise=0.4))
+    (a,) = result.overall()
+    assert (result.noise, result.stated) == (0.4, True)
+    assert result.in_use(a).noisy == pytest.approx(a.robustness.noise_rms["normal"][0], rel=1e-3)  # type: ignore[union-attr]
+    with pytest.raises(InputError, match=r"noise -1\.0: expected a finite number"):
+        Rules(noise=-1.0)
+
+
+def test_ties_go_to_fewer_sensors_then_to_fewer_coefficients() -> None:
+    a, b = InUse(1.0, 1.0, 1.0, sensors=9, numbers=9), InUse(1.04, 1.04, 1.04, sensors=3, numbers=20)
+    assert least({"a": a, "b": b}) == "b"
+    assert least({"a": a, "b": replace(b, sensors=9)}) == "a"
+    assert least({"a": replace(a, numbers=30), "b": replace(b, sensors=9)}) == "b"
+    assert least({"a": a, "b": replace(b, clean=1.2)}) == "a"  # no tie
+    assert least({"a": InUse(np.inf, np.inf, np.inf), "b": InUse(np.inf, np.inf, np.inf, 1)}) == "a"
+
+
+def test_a_block_left_out_has_no_part_in_choosing_for_it() -> None:
+    """The method of a block follows from the other blocks: an error on it changes the other choices only."""
+    good, bad = InUse(1.0, 1.0, 1.0), InUse(2.0, 2.0, 2.0)
+    samples = of(small_machine())
+    judging = splits.leave_one_cycle_out(samples)
+    inners = inner_splits(judging)
+    parts = {name: [Verdict((), refusal="x")] * 4 for name in ("a", "b")}
+    scores = {"a": [[1.0] * len(i.scores) for i in inners], "b": [[2.0] * len(i.scores) for i in inners]}
+    spoiled = [(InUse(1.0, 50.0, 90.0), 100), *[(good, 100)] * 3]
+    found = recommend("z", ["a", "b"], parts, {"a": spoiled, "b": [(bad, 100)] * 4}, scores, inners)
+    assert found is not None
+    assert found.chosen == ("a", "b", "b", "b")
+    assert found.method == "b"
 
 
 def test_one_that_is_named_beforehand_is_not_corrected() -> None:

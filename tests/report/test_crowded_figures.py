@@ -75,6 +75,7 @@ def few(names: tuple[str, ...], condition: float) -> budget.Budget:
         blocks=("1", "2", "3"),
         rms=np.broadcast_to(np.array([9.0, 3.0, 1.2, 0.7])[None, :, None, None], shape),
         none=np.full((len(names), 3), 20.0),
+        rows=np.full((len(names), 3), 100.0),
         frequency=np.ones((4, 4)),
         condition=np.geomspace(1, condition, 4),
         answer=StandInAnswer(np.zeros((1, 4, len(names))), np.eye(4), 0.4),

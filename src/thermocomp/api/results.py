@@ -1,7 +1,7 @@
 """Results for notebooks: tables, figures, and short text."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,12 +77,34 @@ class Compared(Result, Paged):
         Data-quality problems of the recordings.
     samples : Samples, optional
         Judged rows, for figures of the inputs.
+    write : callable, optional
+        `thermocomp.judging.study.fit` with the settings of the comparison.
     """
 
     comparison: Comparison
     recordings: tuple[Recording, ...]
     trouble: tuple[str, ...] = ()
     samples: Samples | None = None
+    write: Callable[..., Fitted] | None = None
+
+    def fit(self, model: Mapping[str, Any] | None = None, *, accept_unproven: str | None = None) -> "FittedModels":
+        """Fit the recommended method of each target to all data, as `thermocomp.fit` does, without comparing again.
+
+        Parameters
+        ----------
+        model : mapping of str to method, optional
+            Methods to be written instead, by target, such as ``{"z_um": "dynamic"}``.
+        accept_unproven : str, optional
+            As for `thermocomp.fit`.
+
+        Raises
+        ------
+        InputError
+            No method could be fitted and stored for a target.
+        """
+        if self.write is None:
+            raise InputError("this comparison has no recordings to fit: compare again")
+        return FittedModels(self.write(model or {}), self.recordings, self.trouble).approved(accept_unproven)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as a dict, as printed by ``--json``."""
@@ -100,7 +122,9 @@ class Compared(Result, Paged):
             "recommended": [
                 {
                     "target": r.target,
-                    "model": r.method,
+                    "model": self.best[r.target],
+                    "written": (written := found.written(r.target)) and written.model,
+                    "error_in_use": written and records.in_use(found, written),
                     "chosen_per_unit": r.chosen,
                     "verdict": r.verdict.word,
                     "reason": r.verdict.told,
@@ -112,7 +136,7 @@ class Compared(Result, Paged):
 
     @property
     def best(self) -> dict[str, str | None]:
-        """Accepted, deployable model with the smallest error, by target; None if there is none."""
+        """Recommended method by target: accepted, with the least error in use; None if there is none."""
         targets = dict.fromkeys(a.target for a in self.comparison.assessments)
         found = {t: self.comparison.best(t) for t in targets}
         return {t: None if a is None else str(a.model) for t, a in found.items()}
@@ -224,6 +248,11 @@ class FittedModels(Result):
         """Mean half-width of the band over the unseen rows, by target [um]; nan without a band."""
         return {a.target: a.half_width for a in self.fitted.comparison.overall()}
 
+    def approved(self, by: str | None) -> "FittedModels":
+        """Return the models with a person's approval of the unproven ones, see `ErrorModel.taken`; None: unchanged."""
+        models = tuple(m.taken(by) for m in self.fitted.models)
+        return replace(self, fitted=replace(self.fitted, models=models))
+
     def explain(self) -> Explanations:
         """Return an explanation to print: the models, their accuracy, and the effect of a failure of each sensor."""
         return explain_all(self.fitted.models)
@@ -300,6 +329,7 @@ class Assessed(Result, Paged):
                 target: {"rms_um": gain.rms, "gain_um": gain.gain, "error_um": gain.error}
                 for target, gain in judged.probing.items()
             },
+            "rms_um_when_fitted": judged.stated,
             "verdict_when_fitted": {m.target: m.honest_error.word for m in judged.models if m.honest_error},
             "taken": {m.target: h.taken for m in judged.models if (h := m.honest_error) is not None and h.taken},
             "trouble": self.trouble,
@@ -320,8 +350,10 @@ class Assessed(Result, Paged):
         return {a.target: a.half_width for a in self.judged.overall()}
 
     def to_frame(self, *, blocks: bool = False) -> pd.DataFrame:
-        """Return a row per model; with `blocks` also a row per thermal cycle."""
-        return frame_of(self.judged.assessments if blocks else self.judged.overall()).drop(columns="deployable")
+        """Return a row per model, with the error stated in its file; with `blocks` also a row per thermal cycle."""
+        table = frame_of(self.judged.assessments if blocks else self.judged.overall()).drop(columns="deployable")
+        table.insert(4, "stated_rms", table["target"].map(self.judged.stated))
+        return table
 
     def plot(self, target: str | None = None) -> "Figure":
         """Return a figure of the model over time on the recordings, for the first target or a given one."""

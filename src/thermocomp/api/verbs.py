@@ -1,7 +1,9 @@
 """The main workflow in Python: compare, fit, assess. The keywords are the options of the commands."""
 
 from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Mapping as ByTarget
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,6 +43,7 @@ def compare(
     margin: float = Support.margin,
     robustness: bool = True,
     primary: str | None = None,
+    noise: float | None = None,
     harm_margin: float | None = None,
     limits: Limits | None = Limits(),
     jobs: int = -1,
@@ -90,6 +93,9 @@ def compare(
         Primary method, chosen before the evaluation: its result is not corrected for multiple comparisons, those of the
         other methods are corrected for the number of methods tried. Default: the recommended method, selected again in
         each fold, with the left-out cycle excluded.
+    noise : float, optional
+        Noise of the temperatures in use, for the choice of the recommended method: standard deviation [degC]. Default:
+        estimated from the recordings.
     harm_margin : float, optional
         Tolerated degradation in a single cycle, day or file, set before the evaluation [um]. Default: the larger of
         three times the probe's noise and 5 % of the largest drift, limited to 2 um.
@@ -122,11 +128,11 @@ def compare(
       model  rms  none_rms   verdict
     0   mra  7.3      79.6  unproven
     1   ols  8.5      79.6  accepted
-    >>> found.best  # the accepted model with the smallest error
+    >>> found.best  # the accepted model with the least error in use
     {'s1_um': 'ols'}
     """
-    listener, rules = Listener(progress), Rules(harm_margin, primary)
-    methods = list(models) if isinstance(models, Iterable) and not _single(models) else [models]
+    listener, rules = Listener(progress), Rules(harm_margin, primary, noise)
+    methods = _listed(models)
     ready = prepare(
         recordings_of(recordings, mapping),
         targets,
@@ -154,7 +160,35 @@ def compare(
         )
     if not robustness:
         found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
-    return Compared(found, ready.tests, tuple(ready.trouble), ready.samples)
+    write = partial(
+        studies.fit,
+        ready.samples,
+        judging=ready.judging,
+        compared=found,
+        rules=rules,
+        support=Support(support, margin),
+        recordings=ready.tests,
+        limits=limits or Limits(),
+        jobs=jobs,
+    )
+    return Compared(found, ready.tests, tuple(ready.trouble), ready.samples, write=write)
+
+
+def _listed(models: Any) -> list[Any]:
+    """Return the methods given as one or as several."""
+    return list(models) if isinstance(models, Iterable) and not _single(models) else [models]
+
+
+def _by_target(model: Any, targets: Sequence[str]) -> dict[str, list[Any]]:
+    """Return the methods for each target, given by target, as ``TARGET=METHOD``, or for all other targets."""
+    own, others = dict[str, list[Any]](), list[Any]()
+    if isinstance(model, ByTarget):
+        own = {target: _listed(m) for target, m in model.items()}
+    else:
+        for entry in _listed(model):
+            target, _, name = entry.rpartition("=") if isinstance(entry, str) else ("", "", entry)
+            (own.setdefault(target, []) if target else others).append(name)
+    return {target: others or list(DEFAULT_MODELS) for target in targets} | own
 
 
 def _single(models: Any) -> bool:
@@ -170,7 +204,7 @@ def _untried(found: Assessment) -> Assessment:
 def fit(
     recordings: Given,
     targets: str | Sequence[str] | None = None,
-    model: Any = "averaged",
+    model: Any = DEFAULT_MODELS,
     *,
     inputs: str | Sequence[str] | None = None,
     split: str | None = None,
@@ -181,6 +215,8 @@ def fit(
     mapping: str | Path | Mapping | None = None,
     support: Policy = "clip",
     margin: float = Support.margin,
+    primary: str | None = None,
+    noise: float | None = None,
     harm_margin: float | None = None,
     tilt: Sequence[str] | None = None,
     limits: Limits = Limits(),
@@ -191,19 +227,23 @@ def fit(
 ) -> FittedModels:
     """Fit a model, judge it on unseen thermal cycles, and write it with its honest error, the error on these cycles.
 
-    The method is first judged on unseen cycles, then fitted to all data. A refused model is also written, but marked as
-    refused, and cannot be run. An unproven one runs in shadow only: its corrections are computed but not applied.
+    The methods are first judged on unseen cycles; of several, that which `compare` recommends is written for each
+    target. Then it is fitted to all data. A refused model is also written, but marked as refused, and cannot be run. An
+    unproven one runs in shadow only: its corrections are computed but not applied. With several methods, such as the
+    default, this takes as long as `compare`; `Compared.fit` reuses the result of a comparison.
 
     Parameters
     ----------
     recordings, targets
         As for `compare`.
-    model : str or estimator
-        Method to fit: any method of ``thermocomp compare`` except gp.
+    model : str, estimator, sequence or mapping of them
+        Method to fit, or several: the recommended one of each target is written. ``z_um=dynamic`` is a method for one
+        target. Any method of ``thermocomp compare`` except gp.
 
-        In Python also an estimator that can be frozen: an estimator of thermocomp, or a Pipeline of selectors and such
-        an estimator.
-    inputs, split, leave_one, absolute, starts, zero_over, mapping, support, margin, harm_margin
+        In Python also an estimator that can be frozen (an estimator of thermocomp, or a Pipeline of selectors and such
+        an estimator), and a mapping such as ``{"z_um": "dynamic"}``; for other targets, the default methods are
+        compared.
+    inputs, split, leave_one, absolute, starts, zero_over, mapping, support, margin, primary, noise, harm_margin
         As for `compare`.
     tilt : sequence of str, optional
         Tilts to predict as well, each defined by two probes and their distance, such as ``A0C=y1_um:y2_um:100mm``
@@ -235,7 +275,7 @@ def fit(
     >>> fitted.save("model.json").name
     'model.json'
     """
-    listener = Listener(progress)
+    listener, rules = Listener(progress), Rules(harm_margin, primary, noise)
     ready = prepare(
         recordings_of(recordings, mapping),
         targets,
@@ -249,21 +289,29 @@ def fit(
         jobs=jobs,
         listener=listener,
     )
+    names = [t.name for t in ready.samples.targets]
+    listed = comparing.methods_of(ready.samples, _by_target(model, names))
+    methods = dict(zip(names, listed, strict=True))
+    several = {t: m for t, m in methods.items() if len(m) > 1}
+    settings: Any = {
+        "rules": rules,
+        "support": Support(support, margin),
+        "limits": limits,
+        "jobs": jobs,
+        "progress": progress,
+    }
     with shared_among(scheduler):
-        listener.begin(lambda: comparing.n_pieces(ready.samples, [model], ready.judging) + len(ready.samples.targets))
+        listener.begin(lambda: comparing.n_pieces(ready.samples, methods, ready.judging, rules))
+        compared = comparing.compare(ready.samples, several, ready.judging, **settings) if several else None
         found = studies.fit(
             ready.samples,
-            model,
+            {t: names[0] for t, names in methods.items() if t not in several},
             ready.judging,
-            rules=Rules(harm_margin),
-            support=Support(support, margin),
+            compared=compared,
             recordings=ready.tests,
-            limits=limits,
-            jobs=jobs,
-            progress=progress,
+            **settings,
         )
-    found = replace(found, models=tuple(m.taken(accept_unproven) for m in found.models))
-    return FittedModels(found, ready.tests, tuple(ready.trouble))
+    return FittedModels(found, ready.tests, tuple(ready.trouble)).approved(accept_unproven)
 
 
 def assess(

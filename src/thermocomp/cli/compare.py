@@ -36,7 +36,7 @@ def compare(found: Compared, face: CommandFace) -> int:
 
 def _following(found: Compared, face: CommandFace) -> tuple[str, ...]:
     """Return the command that follows: fit, or the plan of the next test if no model may run."""
-    usable = any(best is not None for best in found.best.values())
-    return (
-        face.following("fit", output=free("model.json")) if usable else face.following("plan", output=free("next.ngc"))
-    )
+    if all(best is None for best in found.best.values()):
+        return face.following("plan", output=free("next.ngc"))
+    methods = {"model": face.given["models"]} if "models" in face.given else {}
+    return face.following("fit", **methods, output=free("model.json"))

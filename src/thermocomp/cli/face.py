@@ -314,7 +314,7 @@ def command(
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         run.__annotations__ = {p.name: p.annotation for p in parameters}
         run.__doc__ = verb.help
-        run.verb, run.own = verb, [p.name for p in own]  # type: ignore[attr-defined]
+        run.verb, run.own, run.show = verb, [p.name for p in own], show  # type: ignore[attr-defined]
         return run
 
     return made_of

@@ -6,7 +6,7 @@ from thermocomp.cli.terminal import console, print_items
 from thermocomp.report import judged, printed
 
 
-@command("thermocomp.api.verbs:fit", writes=".json", needs_output=True)
+@command("thermocomp.api.verbs:fit", writes=".json", needs_output=True, forms={"model": list[str]})
 def fit(found: FittedModels, face: CommandFace) -> int:
     """Write and show the results.
 

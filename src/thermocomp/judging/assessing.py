@@ -64,6 +64,11 @@ class Judged:
     offsets: dict[str, dict[str, float]] = field(default_factory=dict)
     probing: dict[str, ProbingGain] = field(default_factory=dict)
 
+    @property
+    def stated(self) -> dict[str, float]:
+        """RMS on unseen cycles that the model file states, by target [unit of the target]."""
+        return {m.target: m.honest_error.rms for m in self.models if m.honest_error is not None}
+
     def overall(self) -> tuple[Assessment, ...]:
         """Return the assessments of the models over all cycles, one per model."""
         return tuple(a for a in self.assessments if a.overall)

@@ -47,6 +47,8 @@ class Budget:
         could not be fitted.
     none : ndarray of shape (n_targets, n_blocks)
         RMS without compensation [unit of the target].
+    rows : ndarray of shape (n_targets, n_blocks)
+        Number of judged rows.
     frequency : ndarray of shape (n_sizes, n_candidates)
         Fraction of the splits in which a sensor belongs to the best set.
     condition : ndarray of shape (n_sizes,)
@@ -66,6 +68,7 @@ class Budget:
     blocks: tuple[str, ...]
     rms: FloatArray
     none: FloatArray
+    rows: FloatArray
     frequency: FloatArray
     condition: FloatArray
     answer: StandInAnswer
@@ -80,12 +83,19 @@ class Budget:
         return np.asarray((self.none / self.scales[:, None]).mean(axis=0))
 
     def of_targets(self) -> FloatArray:
-        """Return the mean RMS over the unseen blocks, (n_models, n_sizes, n_targets) [unit of the target]."""
-        return np.asarray(self.rms.mean(axis=3))
+        """Return the RMS over all unseen rows, as in `compare`, (n_models, n_sizes, n_targets) [unit of the target]."""
+        return np.asarray(np.sqrt((self.rows * self.rms**2).sum(axis=3) / self.rows.sum(axis=1)))
 
     def none_of_targets(self) -> FloatArray:
-        """Return the mean RMS without compensation over the unseen blocks, (n_targets,) [unit of the target]."""
-        return np.asarray(self.none.mean(axis=1))
+        """Return the RMS without compensation over all unseen rows, (n_targets,) [unit of the target]."""
+        return np.asarray(np.sqrt((self.rows * self.none**2).sum(axis=1) / self.rows.sum(axis=1)))
+
+    def stated(self, model: str, place: int) -> tuple[float, float]:
+        """Return the RMS over all unseen rows with a set of sensors, and without compensation, mean of the targets."""
+        none = self.none_of_targets()
+        scales = np.where(none > 0, none / 100, 1.0) if self.unit == PERCENT else self.scales
+        of = self.of_targets()[self.models.index(model), place]
+        return float((of / scales).mean()), float((none / scales).mean())
 
     def mean(self) -> FloatArray:
         """Return the mean RMS over blocks and targets, by which sets are compared, (n_models, n_sizes) [`unit`]."""
@@ -228,6 +238,7 @@ def budget(
         blocks=tuple(split.block for split in splits),
         rms=unseen,
         none=none,
+        rows=np.array([[r.sum() for r in blocks] for blocks in judged], dtype=np.float64),
         frequency=np.mean([[[n in s for n in temperatures] for s in subsets] for subsets in sensors[1:]], axis=0),
         condition=_conditions(samples, sensors[0]),
         answer=chosen[0].answer,

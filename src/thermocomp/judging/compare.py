@@ -1,6 +1,6 @@
 """Compare methods on unseen blocks: train, replay, judge."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.judging import do_no_harm
 from thermocomp.judging.diagnostics import Collinearity, collinearity
 from thermocomp.judging.guards import Guard, find_guard
+from thermocomp.judging.inuse import noise_of
 from thermocomp.judging.judge import drop_unreadable, judge, refuse_method
 from thermocomp.judging.leaks import refuse_leaks
 from thermocomp.judging.pieces import work_through
@@ -33,7 +35,7 @@ ALL = "all unseen cycles"
 
 def compare(
     samples: Samples,
-    methods: Sequence[Any],
+    methods: Sequence[Any] | Mapping[str, Sequence[Any]],
     judging: Judging,
     *,
     rules: Rules = Rules(),
@@ -51,6 +53,8 @@ def compare(
 
     Parameters
     ----------
+    methods : sequence, or mapping of str to sequence
+        Methods for all targets, or by target; targets that are not in a mapping are not judged.
     limits : Limits or None
         Limits of the judged compensator. None: the models alone are judged, as in papers, and their sensors are not
         monitored.
@@ -58,15 +62,16 @@ def compare(
         Inputs of the sensor watch. Default: all.
     """
     refuse_leaks(samples, judging)
-    names = expand(methods)
-    rules.check(names)
+    names = methods_of(samples, methods)
+    rules.check([name for mine in names for name in mine])
     by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
-    pieces = [(k, name, split) for k, own in enumerate(by_target) for name in names for split in own.splits]
+    pieces = [(k, name, s) for k, own in enumerate(by_target) for name in names[k] for s in own.splits]
+    noise = noise_of(samples) if rules.noise is None else rules.noise
     done: list[Assessment] = []
     guards, unwatched = _guards(samples, by_target, watched, jobs) if robustness and limits is not None else ({}, {})
     work = partial(_assess_method, samples, rules, support, robustness, limits, guards)
     scores: dict[int, dict[str, list[list[float]]]] = {}
-    inners = [_inners(names, own, rules) for own in by_target]
+    inners = [_inners(mine, own, rules) for mine, own in zip(names, by_target, strict=True)]
     try:
         for a in work_through(work, pieces, partial(refuse_method, samples), jobs=jobs):
             progress(f"{a.target} {a.model} {a.block}")
@@ -84,7 +89,8 @@ def compare(
             continue
         finished += len(mine)
         verdicts = {name: [a.verdict for a in p] for name, p in mine.items()}
-        best = recommend(target.name, list(scores[k]), verdicts, scores[k], inners[k]) if k in scores else None
+        used = {name: [(a.in_use(noise), len(a.measured)) for a in p] for name, p in mine.items()}
+        best = recommend(target.name, list(scores[k]), verdicts, used, scores[k], inners[k]) if k in scores else None
         recommended += [best] if best else []
         found += _concluded(mine, verdicts, rules, best)
     if robustness and refit:
@@ -93,9 +99,11 @@ def compare(
         judging,
         tuple(found),
         _heat(samples),
-        left=len(names) * len(by_target) - finished,
+        left=sum(map(len, names)) - finished,
         recommended=tuple(recommended),
         starts=tuple(zip(samples.test_names, samples.starts, strict=False)),
+        noise=noise,
+        stated=rules.noise is not None,
         unwatched=unwatched,
     )
 
@@ -160,17 +168,17 @@ def _inners(names: Sequence[str], judging: Judging, rules: Rules) -> list[Inner]
 
 def _scores(
     samples: Samples,
-    names: Sequence[str],
+    names: Sequence[Sequence[str]],
     by_target: Sequence[Judging],
     inners: Sequence[Sequence[Inner]],
     jobs: int,
     progress: Callable[[str], None],
 ) -> dict[int, dict[str, list[list[float]]]]:
     """Return the RMS on each inner split, per target and eligible method."""
-    kept = [name for name in names if deployable(name)]
-    pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept for inner in own]
+    kept = [[name for name in mine if deployable(name)] for mine in names]
+    pieces = [(k, name, inner) for k, own in enumerate(inners) for name in kept[k] for inner in own]
     found: dict[int, dict[str, list[list[float]]]] = {
-        k: {name: [] for name in kept} for k, own in enumerate(inners) if own
+        k: {name: [] for name in kept[k]} for k, own in enumerate(inners) if own
     }
     results = work_through(partial(score, samples, by_target), pieces, _no_score, jobs=jobs)
     for (k, name, inner), values in zip(pieces, results, strict=True):
@@ -179,12 +187,28 @@ def _scores(
     return found
 
 
-def n_pieces(samples: Samples, methods: Sequence[Any], judging: Judging, rules: Rules = Rules()) -> int:
+def methods_of(samples: Samples, methods: Sequence[Any] | Mapping[str, Sequence[Any]]) -> list[list[str]]:
+    """Return the names of the methods for each target."""
+    if not isinstance(methods, Mapping):
+        return [expand(methods)] * len(samples.targets)
+    known = [t.name for t in samples.targets]
+    if strange := [t for t in methods if t not in known]:
+        raise InputError(f"a model for {strange[0]!r}, which is not a target; the targets are {', '.join(known)}")
+    return [expand(methods[t]) if t in methods else [] for t in known]
+
+
+def n_pieces(
+    samples: Samples,
+    methods: Sequence[Any] | Mapping[str, Sequence[Any]],
+    judging: Judging,
+    rules: Rules = Rules(),
+) -> int:
     """Return the number of tasks of `compare`."""
-    names = expand(methods)
-    by_target = [drop_unreadable(samples, k, judging) for k in range(len(samples.targets))]
-    choices = sum(deployable(name) for name in names)
-    return sum(len(names) * len(own.splits) + choices * len(_inners(names, own, rules)) for own in by_target)
+    total = 0
+    for k, names in enumerate(methods_of(samples, methods)):
+        own = drop_unreadable(samples, k, judging)
+        total += len(names) * len(own.splits) + sum(map(deployable, names)) * len(_inners(names, own, rules))
+    return total
 
 
 def split_by_cycle(whole: Assessment) -> list[Assessment]:

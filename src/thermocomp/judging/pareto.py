@@ -33,12 +33,12 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     recommended = found.recommended()
     m, best = np.unravel_index(int(np.nanargmin(found.mean())), found.mean().shape)
     model, place = recommended or (found.models[int(m)], int(best))
-    sensors, error = found.sensors[place], float(found.mean()[found.models.index(model), place])
+    sensors, (error, none) = found.sensors[place], found.stated(model, place)
     told = f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
-    told += f"unseen cycles{_mean(found)}, instead of {found.none_mean():.2f} {found.unit}"
+    told += f"unseen cycles{_mean(found)}, instead of {none:.2f} {found.unit}"
     tables = [
         _errors(found, judging, model, place if recommended else None),
-        *([_by_target(found, model, place)] if len(found.targets) > 1 else []),
+        _by_target(found, model, place),
     ]
     notes, failure = _notes(found, judging), ""
     if recommended is None:
@@ -95,10 +95,8 @@ def _failed(found: Budget) -> str:
 
 
 def _rms(found: Budget) -> str:
-    """Return the name of the compared metric: the RMS of a block, or its mean over the blocks."""
-    if len(found.blocks) == 1:
-        return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
-    return "% of the mean RMS without compensation" if found.unit == PERCENT else f"{found.unit} mean RMS"
+    """Return the name of the error over all unseen rows."""
+    return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
 
 
 def _mean(found: Budget) -> str:
@@ -123,7 +121,7 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
         ),
         rows=rows,
         marked=place,
-        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}; without compensation "
+        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}, to compare sets; without compensation "
         f"{found.none_mean():.2f} {found.unit}. Gain of the next row: reduction of the error of {model} by the "
         "additional sensors of the next row. Sufficient number of sensors: "
         + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
@@ -141,10 +139,11 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
     worst = int(np.argmax(more))
     return Table(
         title=f"Error on unseen blocks for each displacement: {model}",
-        columns=("sensors", *(f"{t} mean RMS" for t in found.targets)),
+        columns=("sensors", *(f"{t} RMS" for t in found.targets)),
         rows=rows,
         marked=1 + place,
-        caption="Each in the unit of the displacement; 0 sensors: without compensation."
+        caption="Over all unseen rows, as in `compare` and `fit`, each in the unit of the displacement; 0 sensors: "
+        "without compensation."
         + (
             f" {found.targets[worst]} is affected most: {more[worst]:.2f} {found.unit} more than with all sensors."
             if place + 1 < len(errors)

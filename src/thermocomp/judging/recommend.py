@@ -1,8 +1,10 @@
 """Recommended method: selected again in each fold, with the left-out block (cycle or file) excluded.
 
 The error of a selection among methods is not the error of the method with the best result: the best of twenty is partly
-luck. Therefore the selection is repeated for every left-out block, by the cross-validation error on the other blocks
-(nested cross-validation, Varma and Simon 2006), and the selected method is judged on the left-out block.
+luck. Therefore the selection is repeated for every left-out block, by the error in use on the other blocks (nested
+cross-validation, Varma and Simon 2006), and the selected method is judged on the left-out block. The error with clean
+readings is that of models trained without either block. The effects of noise and of lost sensors are those on the other
+blocks, of models trained with the left-out block: effects of readings on a model, not its error on that block.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermocomp.judging.baselines import NO_NOISE
 from thermocomp.judging.do_no_harm import Verdict, join_verdicts
+from thermocomp.judging.inuse import InUse, least, pool
 from thermocomp.judging.splits import Judging, Split
 from thermocomp.models.training import fit_method
 from thermocomp.recordings.samples import Samples
@@ -103,10 +105,20 @@ def recommend(
     target: str,
     methods: Sequence[str],
     parts: Mapping[str, Sequence[Verdict]],
+    used: Mapping[str, Sequence[tuple[InUse, int]]],
     inner: Mapping[str, Sequence[Sequence[float]]],
     inners: Sequence[Inner],
 ) -> Recommendation | None:
     """Recommend a method for a target.
+
+    Parameters
+    ----------
+    parts : mapping of str to sequence of Verdict
+        By method: verdict on each left-out block.
+    used : mapping of str to sequence of (InUse, int)
+        By method: error in use on each left-out block, and its number of rows.
+    inner : mapping of str to sequence of sequence of float
+        By method: result of `score` for each of `inners`.
 
     Returns
     -------
@@ -116,23 +128,21 @@ def recommend(
     if not inners or not methods:
         return None
     n = len(parts[methods[0]])
-    logs = np.full((len(methods), n, n), np.nan)  # axes: method, outer left-out unit, inner unit
-    for k, name in enumerate(methods):
-        for found, values in zip(inners, inner[name], strict=True):
-            for (u, v), rms in zip(found.scores, values, strict=True):
-                logs[k, u, v] = np.log(max(rms, NO_NOISE))
-    best = np.nanmean(logs, axis=2).argmin(axis=0)
-    chosen = tuple(methods[k] for k in best)
+    errors: list[dict[str, InUse]] = []
+    for u in range(n):
+        errors.append({})
+        for name in methods:
+            clean = {
+                v: rms
+                for found, values in zip(inners, inner[name], strict=True)
+                for (outer, v), rms in zip(found.scores, values, strict=True)
+                if outer == u
+            }
+            errors[u][name] = pool([(used[name][v][0].about(rms), used[name][v][1]) for v, rms in clean.items()])
+    chosen = tuple(least(of) for of in errors)
     judged = [parts[name][u] for u, name in enumerate(chosen)]
-    outer = [np.nanmean([_log(v) for v in parts[name]]) for name in methods]
-    return Recommendation(target, methods[int(np.argmin(outer))], chosen, join_verdicts(judged, about="the choice"))
-
-
-def _log(verdict: Verdict) -> float:
-    """Return the logarithm of a method's error on a block; infinite if it failed, nan if there were too few rows."""
-    if not verdict.units:
-        return np.inf if verdict.refusal else np.nan
-    return float(np.mean([np.log(max(u.rms, NO_NOISE)) for u in verdict.units]))
+    method = least({name: pool(used[name]) for name in methods})
+    return Recommendation(target, method, chosen, join_verdicts(judged, about="the choice"))
 
 
 def correct_verdicts(

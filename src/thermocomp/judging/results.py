@@ -1,7 +1,7 @@
 """Rules of an evaluation, and its results: `Assessment` and `Comparison`."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import Word, accepted
 from thermocomp.judging import do_no_harm, metrics
 from thermocomp.judging.diagnostics import Collinearity
+from thermocomp.judging.inuse import InUse, least
 from thermocomp.judging.probing import Probed
 from thermocomp.judging.recommend import Recommendation
 from thermocomp.judging.robustness import Robustness
@@ -30,6 +31,8 @@ class Rules:
     margin : float or None
         Tolerated degradation in a single cycle or file [unit of the target]; None: calculated by
         `do_no_harm.margin_of`.
+    noise : float or None
+        Standard deviation of the noise of the temperatures in use [degC]; None: estimated from the recordings.
     primary : str or None
         Primary method: its verdict is found without a correction for multiple comparisons, those of the others with
         one.
@@ -37,8 +40,11 @@ class Rules:
 
     margin: float | None = None
     primary: str | None = None
+    noise: float | None = None
 
     def __post_init__(self) -> None:
+        if self.noise is not None and not 0 <= self.noise < np.inf:
+            raise InputError(f"noise {self.noise}: expected a finite number that is not negative")
         if self.margin is not None and not 0 <= self.margin < np.inf:
             raise InputError(f"margin {self.margin}: expected a finite number that is not negative")
 
@@ -172,6 +178,14 @@ class Assessment:
         """RMS with noise on every temperature; without, if its effect was not tested [um]."""
         return self.metric("rms") if self.robustness is None else self.robustness.noisy_rms
 
+    def in_use(self, noise: float) -> InUse:
+        """Return the error in use with a noise of the temperatures [degC]; its numbers only for a single block."""
+        numbers = len(self.frozen.coefficients_by_name()) if self.frozen is not None and self.deployable else 0
+        ties = {"sensors": self.n_sensors[1], "numbers": numbers}
+        if self.failure:
+            return InUse(np.inf, np.inf, np.inf, **ties)
+        return InUse.of(self.metric("rms"), self.undisturbed, self.robustness, noise, **ties)
+
     def held_metric(self, name: str) -> float:
         """Return a metric for compensation by probings alone, each held until the next; without probings, for none."""
         held = np.zeros_like(self.measured) if self.probed is None else self.probed.held(self.measured, self.test)
@@ -237,6 +251,10 @@ class Comparison:
         Per target, if there was a choice.
     starts : tuple of (str, Start)
         Names of the recordings, and their initial states.
+    noise : float
+        Noise of the temperatures in use [degC].
+    stated : bool
+        The noise was stated before the evaluation, not estimated from the recordings.
     unwatched : dict of str to str
         Blocks for which no watch could be trained, and why: the loss of a sensor is judged there as if undetected.
     """
@@ -247,6 +265,8 @@ class Comparison:
     left: int = 0
     recommended: tuple[Recommendation, ...] = ()
     starts: tuple[tuple[str, Start], ...] = ()
+    noise: float = 0.0
+    stated: bool = False
     unwatched: dict[str, str] = field(default_factory=dict)
 
     def overall(self) -> tuple[Assessment, ...]:
@@ -254,11 +274,42 @@ class Comparison:
         return tuple(a for a in self.assessments if a.overall)
 
     def best(self, target: str) -> Assessment | None:
-        """Return the assessment of the method to be used for a target: the recommended one if it was accepted.
+        """Return the assessment of the recommended method for a target; None if none may run.
 
-        Otherwise the accepted method with the smallest RMS with noisy temperatures that can be deployed; None if there
-        is none.
+        Of the accepted methods that can be deployed, it has the least error in use; see `thermocomp.judging.inuse`.
         """
-        fit = [a for a in self.overall() if a.target == target and a.accepted and a.deployable]
-        first = {r.method for r in self.recommended if r.target == target}
-        return min(fit, key=lambda a: (a.model not in first, a.noisy_rms), default=None)
+        fit = [a for a in self._candidates(target) if a.accepted and a.metric("rms") <= a.none_metric("rms")]
+        return self._least(fit) if fit else None
+
+    def in_use(self, judged: Assessment) -> InUse:
+        """Return the error in use of a method over all blocks."""
+        own = [a for a in self.assessments if (a.target, a.model) == (judged.target, judged.model)]
+        return replace(judged.in_use(self.noise), numbers=max(a.in_use(self.noise).numbers for a in own))
+
+    def next_best(self, target: str) -> Assessment | None:
+        """Return the accepted method with the least error in use besides the recommended one."""
+        best = self.best(target)
+        others = [a for a in self._candidates(target) if a.accepted and a is not best]
+        return min(others, key=lambda a: self.in_use(a).rms, default=None)
+
+    def _candidates(self, target: str) -> list[Assessment]:
+        return [a for a in self.overall() if a.target == target and a.deployable and not a.failure]
+
+    def _least(self, judged: Sequence[Assessment]) -> Assessment:
+        found = {a.model: a for a in judged}
+        return found[least({name: self.in_use(a) for name, a in found.items()})]
+
+    def written(self, target: str) -> Assessment | None:
+        """Return the assessment of the method that ``fit`` writes for a target.
+
+        It is `best`, or if none was accepted, the unproven or else the refused one with the least error in use; None if
+        no method could be judged that can be stored as coefficients.
+        """
+        own = self._candidates(target)
+        open_ones = [a for a in own if a.word != "refused"] or own
+        return self.best(target) or (self._least(open_ones) if open_ones else None)
+
+    def of(self, chosen: Mapping[str, str]) -> "Comparison":
+        """Return the results of one method per target, in the order of `chosen`."""
+        kept = (a for target, name in chosen.items() for a in self.assessments if (a.target, a.model) == (target, name))
+        return replace(self, assessments=tuple(kept))

@@ -1,6 +1,6 @@
-"""Fitting of one method, with its error on unseen data."""
+"""Fitting of one method per target, with its error on unseen data."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError, accepted
+from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage
 from thermocomp.judging.compare import compare
 from thermocomp.judging.guards import find_guard
@@ -19,7 +20,8 @@ from thermocomp.judging.results import Assessment, Comparison, Rules
 from thermocomp.judging.splits import Judging
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.methods import deployable, expand
-from thermocomp.models.training import train
+from thermocomp.models.training import Trained, train
+from thermocomp.models.watching import find_watch
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 
@@ -48,9 +50,10 @@ class Fitted:
 
 def fit(
     samples: Samples,
-    method: Any,
+    methods: Any,
     judging: Judging,
     *,
+    compared: Comparison | None = None,
     rules: Rules = Rules(),
     support: Support = Support(),
     recordings: Sequence[Recording] = (),
@@ -58,38 +61,86 @@ def fit(
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fitted:
-    """Judge a method on unseen blocks, then fit it to all rows."""
-    (method,) = expand([method])
-    if not deployable(method):
-        raise InputError(f"{method} cannot be stored as coefficients: judge it with 'compare', or fit another method")
+    """Judge a method per target on unseen blocks, then fit it to all rows.
+
+    Parameters
+    ----------
+    methods : method, or mapping of str to method
+        Method for all targets, or by target.
+    compared : Comparison, optional
+        Targets without a method get the one that it recommends, with its results there.
+    """
+    names = [t.name for t in samples.targets]
+    given = methods if isinstance(methods, Mapping) else dict.fromkeys(names, methods)
+    given = {target: expand([method])[0] for target, method in given.items()}
+    chosen = dict.fromkeys(names, "") | given
+    for target in [t for t in names if t not in given]:
+        if (best := compared.written(target) if compared else None) is None:
+            raise InputError(f"{target}: no method could be fitted and judged that can be stored as coefficients")
+        chosen[target] = best.model
+    for method in given.values():
+        if not deployable(method):
+            raise InputError(
+                f"{method} cannot be stored as coefficients: judge it with 'compare', or fit another method"
+            )
     everything = np.ones(len(samples), dtype=np.bool_)
-    written = [train(method, samples, k, everything, support=support, prints=True) for k in range(len(samples.targets))]
+    written = [train(m, samples, k, everything, support=support, prints=True) for k, m in enumerate(chosen.values())]
     speeds = [c.name for c in samples.inputs if c.quantity == "spindle_speed"]
     watched = list(dict.fromkeys([*(i.name for w in written for i in w.model.inputs), *speeds]))
-    comparison = compare(
+    parts = [compared.of({t: m for t, m in chosen.items() if t not in given})] if compared else []
+    if given:
+        parts += [
+            compare(
+                samples,
+                {target: [method] for target, method in given.items()},
+                judging,
+                rules=replace(rules, primary=None),
+                support=support,
+                refit=False,
+                limits=limits,
+                watched=watched,
+                jobs=jobs,
+                progress=progress,
+            )
+        ]
+    if any(c.left for c in parts):
+        raise KeyboardInterrupt
+    ordered = (a for t in names for c in parts for a in c.assessments if a.target == t)
+    return _write(
+        replace(parts[0], assessments=tuple(ordered)),
         samples,
-        [method],
-        judging,
-        rules=rules,
+        written,
+        watched,
+        tested={*names} - {*given},
         support=support,
-        refit=False,
-        limits=limits,
-        watched=watched,
-        jobs=jobs,
-        progress=progress,
+        covered=coverage.find_validity(samples, judging, recordings),
     )
-    known = samples.only(watched)
-    names = [c.name for c in samples.inputs]
-    guard = find_guard(known, everything, everything)
+
+
+def _write(
+    comparison: Comparison,
+    samples: Samples,
+    written: Sequence[Trained],
+    watched: Sequence[str],
+    *,
+    tested: Collection[str],
+    support: Support,
+    covered: Validity | None,
+) -> Fitted:
+    """Add to each model its error on unseen data and the watch; `tested`: targets whose methods were compared."""
+    everything = np.ones(len(samples), dtype=np.bool_)
+    known, names = samples.only(watched), [c.name for c in samples.inputs]
+    # `compare` has tested accepted models as written, with a watch of all inputs
+    done = {a.target for a in comparison.overall() if a.target in tested and a.accepted and len(watched) == len(names)}
+    guard = find_guard(known, everything, everything) if len(done) < len(written) else None
+    watch = guard.watch if guard else find_watch(known, everything)
     let = guard and guard.among([names.index(c.name) for c in known.inputs])
-    covered = coverage.find_validity(samples, judging, recordings)
     models, tried = list[ErrorModel](), dict[str, Assessment]()
     for overall, trained in zip(comparison.overall(), written, strict=True):
-        progress(f"{overall.target} {method} all rows")
         model = replace(trained.model, support=support_of(overall, support))
-        tried[overall.target] = stress_written(overall, model, samples, let)
-        honest = honest_error(tried[overall.target], judging)
-        models.append(replace(model, honest_error=honest, validity=covered, watch=guard.watch if guard else None))
+        tried[overall.target] = overall if overall.target in done else stress_written(overall, model, samples, let)
+        honest = honest_error(tried[overall.target], comparison.judging)
+        models.append(replace(model, honest_error=honest, validity=covered, watch=watch))
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
     return Fitted(
         tuple(models),

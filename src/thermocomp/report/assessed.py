@@ -4,7 +4,7 @@ Each section of the page is made by a function listed in `SECTIONS`.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from thermocomp.judging import coverage
@@ -31,7 +31,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
         "assessed.html",
         **content
         | {
-            "verdict": "; ".join(map(_verdict, overall)) + ".",
+            "verdict": "; ".join(_verdict(a, judged.stated) for a in overall) + ".",
             "good": all(a.accepted for a in overall),
             "predictions": draw_runs(seen, recordings),
             "cautions": [*_fitted_badly(judged), *content["cautions"], *(c for s in sections for c in s.cautions)],
@@ -41,10 +41,11 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
     )
 
 
-def _verdict(a: Assessment) -> str:
+def _verdict(a: Assessment, stated: Mapping[str, float]) -> str:
     if a.failure:
         return f"{a.target}: {a.reason}"
-    return f"{a.target}: {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um"
+    known = f" ({stated[a.target]:.2f} um stated in the model file)" if a.target in stated else ""
+    return f"{a.target}: {a.word}, {a.metric('rms'):.2f} um RMS{known} instead of {a.none_metric('rms'):.2f} um"
 
 
 def _fitted_badly(judged: Judged) -> Iterator[str]:

@@ -52,8 +52,8 @@ def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
     overall = comparison.overall()
     drawn = {}
     for target in dict.fromkeys(a.target for a in overall):
-        shown = comparison.best(target)
-        if shown is None:  # no usable model: show the least bad one, marked as refused
+        shown = comparison.written(target)
+        if shown is None:  # none that can be written: show the least bad one, marked as refused
             candidates = [a for a in overall if a.target == target and not a.failure]
             shown = min(candidates, key=lambda a: a.metric("rms"), default=None)
         if shown is not None:

@@ -20,7 +20,7 @@ from thermocomp.report.layout import Column, Item, Layout, PrintedLine, Toned, l
 from thermocomp.report.losses import describe_losses
 from thermocomp.report.probings import describe_gains, describe_probings
 from thermocomp.report.running import describe_running
-from thermocomp.report.summary import cautions, describe_unlike
+from thermocomp.report.summary import cautions, describe_choice, describe_unlike
 
 BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
@@ -38,6 +38,7 @@ def comparison(found: Comparison) -> Iterator[Item]:
         best = found.best(target)
         if best is None:
             yield PrintedLine("", Toned(f"{target}: no model may run yet", "grave"))
+            yield PrintedLine(f" {describe_choice(found, target)}")
         else:
             yield PrintedLine(
                 f", {best.metric('rms'):.2f} um RMS instead of {best.none_metric('rms'):.2f} um "
@@ -45,6 +46,7 @@ def comparison(found: Comparison) -> Iterator[Item]:
                 Toned(f"{target}: {best.model}", "chosen"),
                 whole=True,
             )
+            yield PrintedLine(f" {describe_choice(found, target)}")
     yield from (PrintedLine(f" {caution}", BUT) for caution in cautions(found))
     yield from map(PrintedLine, describe_running(found.overall()))
     if found.left:
@@ -77,6 +79,10 @@ def fit(fitted: Fitted) -> Iterator[Item]:
         Column("verdict", lambda m: verdict(m["verdict"])),
     )
     yield Layout(columns, models)
+    for a in overall:
+        if a.verdict.tried > 1:
+            told = describe_choice(fitted.comparison, a.target)
+            yield PrintedLine(f" {told}", Toned(f"{a.target}: {a.model},", "chosen"))
     for m in fitted.models:
         if m.honest_error is not None:
             yield PrintedLine(f" {m.target}: {m.honest_error.why}", verdict(m.honest_error.word), whole=True)
@@ -98,6 +104,9 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     yield _cycle_table(judged.assessments)
     yield _robustness(judged.overall())
     for a in judged.overall():
+        if a.target in judged.stated and not a.failure:
+            stated = f"{judged.stated[a.target]:.2f} um stated in the model file"
+            yield PrintedLine(f"{a.target}: {a.metric('rms'):.2f} um RMS here, {stated}")
         yield PrintedLine(f" {a.target}: {a.reason}", verdict(a.word), whole=True)
         if a.robustness is not None:
             yield from _disturbed(a.target, a.robustness)

@@ -11,7 +11,8 @@ import numpy as np
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
-from thermocomp.judging.results import Assessment
+from thermocomp.judging.inuse import WEIGHTS
+from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.layout import Column
@@ -144,6 +145,20 @@ def assessment(a: Assessment) -> dict[str, Any]:
             "outside_range_rms_um": r.outside_rms,
         }
     return content
+
+
+def in_use(found: Comparison, a: Assessment) -> dict[str, Any]:
+    """Return the error in use of a method, and what it is made of."""
+    e = found.in_use(a)
+    return {
+        "rms_um": e.rms,
+        "clean_rms_um": e.clean,
+        "noise_rms_um": e.noisy,
+        "lost_sensor_rms_um": e.lost,
+        "weights": WEIGHTS,
+        "noise_degC": found.noise,
+        "noise_stated": found.stated,
+    }
 
 
 def _probed(a: Assessment) -> dict[str, Any]:

@@ -116,7 +116,7 @@ def budget(b: Budget) -> Drawn:
         shown = b.models.index(recommended[0]) if recommended else 0
         mean = ", mean" if len(b.targets) > 1 else ""
         if mean:
-            for k, (target, values) in enumerate(zip(b.targets, (b.of_targets() / b.scales)[shown].T, strict=True)):
+            for k, (target, values) in enumerate(zip(b.targets, (b.rms.mean(axis=3) / b.scales)[shown].T, strict=True)):
                 colour, label = COLOURS[(k + len(b.models)) % len(COLOURS)], shorten(target, LONGEST)
                 errors.plot(sizes, values, "--", color=colour, lw=1, label=f"{b.models[shown]}, {label}")
         for k, model in enumerate(b.models):

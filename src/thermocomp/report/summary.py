@@ -7,6 +7,7 @@ from typing import Any
 from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage, do_no_harm
 from thermocomp.judging.choice import Table
+from thermocomp.judging.inuse import WEIGHTS
 from thermocomp.judging.metrics import METRICS
 from thermocomp.judging.refit import describe_method, fit_whole
 from thermocomp.judging.results import Assessment, Comparison
@@ -79,6 +80,28 @@ def verdict(comparison: Comparison) -> str:
     if left:
         text += f"; no model passed for {_list(left)}"
     return text + "."
+
+
+def describe_choice(comparison: Comparison, target: str) -> str:
+    """Return the numbers behind the recommended method of a target, or which one is written if none is accepted."""
+    best, chosen = comparison.best(target), comparison.written(target)
+    if chosen is None:
+        return "no method can be written"
+    e, other = comparison.in_use(chosen), comparison.next_best(target)
+    known = "stated" if comparison.stated else "estimated"
+    weights = ":".join(f"{w:g}" for w in WEIGHTS)
+    text = (
+        f"error in use {e.rms:.2f} um (root mean square, weights {weights}, of {e.clean:.2f} with clean readings, "
+        f"{e.noisy:.2f} with noise of {comparison.noise:.2g} degC, {known}, and {e.lost:.2f} with one sensor lost)"
+    )
+    if best is None:
+        return f"none is accepted; fit writes {chosen.model}, {chosen.word}: {text}"
+    if other is None:
+        alone = sum(a.target == target for a in comparison.overall()) == 1
+        return text if alone else f"{text}; no other method is accepted"
+    further = comparison.in_use(other).rms
+    tie = ", a tie: fewer sensors or coefficients" if further < e.rms else ""
+    return f"{text}; {other.model} {further:.2f} um{tie}"
 
 
 def cautions(comparison: Comparison) -> list[str]:
@@ -160,6 +183,7 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
         ],
         "banded": any(a.band for a in overall),
         "best": best.model if best else None,
+        "choice": "" if samples is None else describe_choice(comparison, target),
         "formula": _formula(comparison, best, samples),
     }
 

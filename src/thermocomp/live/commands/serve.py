@@ -145,7 +145,7 @@ def _demo(folder: Path) -> Path:
             from thermocomp.api.verbs import fit
         from thermocomp.virtual.verbs import simulate
 
-        fit(simulate("demo"), _TARGETS, inputs=_INPUTS, jobs=-1).save(model)
+        fit(simulate("demo"), _TARGETS, "averaged", inputs=_INPUTS, jobs=-1).save(model)
     if not config.exists():
         text = _CONFIG.format(speed=_SPEED)
         write_text(text, config, overwrite=False)

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
+from thermocomp.api import verbs
 from thermocomp.cli import loudness
 from thermocomp.cli.answers import print_answer, print_folded
 from thermocomp.cli.compare import compare
+from thermocomp.cli.face import CommandFace
 from thermocomp.cli.fit import fit
 from thermocomp.cli.options import Output
+from thermocomp.cli.progress import show_progress
 from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
@@ -45,11 +48,15 @@ def demo(
         intro = "Drift test of a virtual machine tool; five methods on unseen thermal cycles:"
         print_folded(PrintedLine(intro), 2, console)
     simulate("demo", output=recording, seed=seed, overwrite=overwrite, quiet=True)
-    compare([recording], output=report, overwrite=overwrite, json=json, part=True)
-    code: int = fit([recording], output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
+    face = CommandFace(output=report, overwrite=overwrite, json=json, part=True)
+    with show_progress(hidden=json, warn=face.warn) as progress:
+        found = verbs.compare(recording, progress=progress)
+    compare.show(found, face)  # type: ignore[attr-defined]
+    face = CommandFace(output=model, overwrite=overwrite, quiet=json or not loudness.details, part=True)
+    code = int(fit.show(found.fit(), face))  # type: ignore[attr-defined]
     if not json:
         told = CommandAnswer(
-            head="The model file has 'averaged', fitted to all cycles.",
+            head="The model file has the methods used above, fitted to all cycles.",
             files=[recording, report, model],
             following=("thermocomp", "explain", str(model)),
         )
