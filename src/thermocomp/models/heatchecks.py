@@ -134,39 +134,50 @@ def _find_faults(
     rows = np.flatnonzero(folds >= 0)
     instants = rows[np.linspace(0, len(rows) - 1, INSTANTS).astype(np.intp)]
     kinds: tuple[FaultOfSpeed, ...] = ("zero", "stuck", "halved", "beyond")
+    begun, wanted = np.stack([heats[instants], stored[instants]]), time[instants] + FOLLOWED
+    last = np.minimum(ends[np.searchsorted(new, instants, side="right") - 1], np.searchsorted(time, wanted))
+    followed = instants + np.arange(int((last - instants).max()))[:, None]  # (n_steps, n_instants)
+    known = followed < last
+    followed = np.where(known, followed, instants)
+    passed = np.where(known, np.diff(time[followed], axis=0, prepend=time[instants][None]), 0.0)
+    right, expected = share[followed], np.where(known[..., None], estimates[followed], np.nan)
     for kind in kinds:
-        delays = list[float]()
-        for i in instants.tolist():
-            end = int(ends[np.searchsorted(new, i, side="right") - 1])
-            mine = slice(i, min(end, int(np.searchsorted(time, time[i] + FOLLOWED))))
-            wrong = {"zero": 0.0 * share[mine], "stuck": np.full_like(share[mine], share[i]), "halved": share[mine] / 2}
-            read = wrong.get(kind, np.full_like(share[mine], BEYOND))
-            passed = np.diff(time[mine], prepend=time[i])
-            counts = np.cumsum(np.where(np.abs(read - share[mine]) >= WRONG, passed, 0.0))
-            if counts[-1] >= LEAST_WRONG:
-                begun = np.stack([heats[i], stored[i]])
-                found = [_find_fault(c, read, passed, begun[:, k], estimates[mine, k]) for k, c in enumerate(checks)]
-                delays.append(min(np.inf if f is None else float(counts[f]) for f in found))
+        wrong = {"zero": 0.0 * right, "stuck": np.broadcast_to(share[instants], right.shape), "halved": right / 2}
+        read = wrong.get(kind, np.full_like(right, BEYOND))
+        counts = np.cumsum(np.where(np.abs(read - right) >= WRONG, passed, 0.0), axis=0)
+        found = [_find_fault(c, read, passed, begun[..., k], expected[..., k]) for k, c in enumerate(checks)]
+        after = np.append(counts, np.full_like(counts[:1], np.inf), axis=0)  # a row more: not found
+        delays = np.min([np.take_along_axis(after, f[None], axis=0)[0] for f in found], axis=0)
+        delays = delays[counts[-1] >= LEAST_WRONG].tolist()
         if delays:
-            known = [d for d in delays if np.isfinite(d)]
-            late = float(np.quantile(known, 0.95)) / 60 if known else 0.0
-            yield SpeedFault(checks[0].input, kind, round(len(known) / len(delays), 3), round(late, 1))
+            seen = [d for d in delays if np.isfinite(d)]
+            late = float(np.quantile(seen, 0.95)) / 60 if seen else 0.0
+            yield SpeedFault(checks[0].input, kind, round(len(seen) / len(delays), 3), round(late, 1))
 
 
 def _find_fault(
     check: HeatCheck, read: FloatArray, passed: FloatArray, begun: FloatArray, estimate: FloatArray
-) -> int | None:
-    """Return the row in which a check finds a wrong speed, read since the first row; None if it does not.
+) -> IntArray:
+    """Return the row in which a check finds a wrong speed, read since the first row; n_rows if it does not.
 
     Parameters
     ----------
-    begun : ndarray of shape (2,)
+    read, passed, estimate : ndarray of shape (n_rows, n_instants)
+        Wrong speed, time since the previous row [s] and estimated heat after each instant.
+    begun : ndarray of shape (2, n_instants)
         Heat and stored heat before the fault.
+
+    Returns
+    -------
+    ndarray of int of shape (n_instants,)
     """
-    heat = lagbank.run((read**check.power)[:, None], passed, np.array([check.lag]), begun[:1])
-    stored = lagbank.run(heat, passed, np.array([THRESHOLDS.heat_stored]), begun[1:])
-    difference, time, of = heat - estimate[:, None], np.cumsum(passed), HeatConstants.of([check], [check.input])
-    far = (np.abs(difference) > find_limits(difference, heat, stored, of, THRESHOLDS))[:, 0]
-    since = np.maximum.accumulate(np.where(far, 0.0, time))  # last instant at which it was within the limit
-    lasting = np.flatnonzero(far & (time - since >= THRESHOLDS.fault_duration))
-    return int(lasting[0]) if lasting.size else None
+    with np.errstate(divide="ignore"):  # no time passes after the last row
+        paces = [tau / passed for tau in (check.lag, THRESHOLDS.heat_stored)]
+    ones = np.ones(len(read))
+    heat = lagbank.run(read**check.power, ones, paces[0], begun[0])
+    stored = lagbank.run(heat, ones, paces[1], begun[1])
+    difference, time, of = heat - estimate, np.cumsum(passed, axis=0), HeatConstants.of([check], [check.input])
+    far = np.abs(difference) > find_limits(difference, heat, stored, of, THRESHOLDS)
+    since = np.maximum.accumulate(np.where(far, 0.0, time), axis=0)  # last instant at which it was within the limit
+    lasting = far & (time - since >= THRESHOLDS.fault_duration)
+    return np.where(lasting.any(axis=0), lasting.argmax(axis=0), len(read))
