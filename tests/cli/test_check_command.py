@@ -97,3 +97,22 @@ def test_stretches() -> None:
     assert stretches(np.array([], dtype=int)) == []
     assert stretches([5]) == [[5, 6]]
     assert stretches([3, 1, 2, 7, 9, 8]) == [[1, 4], [7, 10]]
+
+
+def test_files_of_two_loggers_are_joined_next(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    recording = small_machine(dt=200.0)
+    table = recording.table.assign(time_s=recording.time)
+    probes = [c for c in table if c.endswith("_um")]
+    table[["time_s", *probes]].to_csv("probes.csv", index=False)
+    table.drop(columns=probes).to_csv("heat.csv", index=False)
+    Path("joined.parquet").touch()  # a name that is taken is not proposed
+    run(["check", "probes.csv", "heat.csv"])
+    said = capsys.readouterr().out
+    assert "2 recordings, " in said
+    assert said.rstrip().endswith("Next: thermocomp join heat.csv probes.csv -o joined-2.parquet")
+    for one in ("probes.csv", "heat.csv"):
+        run(["check", one])
+        assert "Next:" not in capsys.readouterr().out

@@ -7,6 +7,7 @@ from thermocomp.cli.answers import free
 from thermocomp.cli.checked import answer_check, show_check
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console
+from thermocomp.recordings.joining import find_joins
 
 
 @command("thermocomp.api.check:check", writes=".html", tell_changes=False)
@@ -34,8 +35,11 @@ def check(found: CheckedRecordings, face: CommandFace) -> int:
 
 
 def _following(found: CheckedRecordings, face: CommandFace) -> tuple[str, ...]:
-    """Return the command that follows: compare, or map for a file that needs repair."""
+    """Return the command that follows: map for a file that needs repair, join for two loggers, else compare."""
     for path, findings in zip(face.given["recordings"], found.findings, strict=True):
         if any(f.severity == "trouble" and f.remedy is not None for f in findings):
             return face.following("map", recording=path, output=free(f"{path.stem}.toml"))
-    return face.following("compare", output=free("report.html"))
+    for words in find_joins(found.recordings):
+        return (*words[:-1], str(free(words[-1])))
+    whole = all(r.displacements and (r.temperatures or r.speed is not None) for r in found.recordings)
+    return face.following("compare", output=free("report.html")) if whole else ()

@@ -30,14 +30,21 @@ def show_check(found: CheckedRecordings, console: Console) -> None:
 def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Sequence[str]) -> CommandAnswer:
     """Return the answer of ``check``: the recordings, the worst first, and the worst finding."""
     contents = sorted(found.to_dict()["recordings"], key=lambda r: _GRADES.index(r["worst"]))
-    named = [(f, f"{r.name}: " if len(contents) > 1 else "") for r, fs in _pairs(found) for f in fs]
+    named = [(f, f"{r.name}:" if len(contents) > 1 else "") for r, fs in _pairs(found) for f in fs]
     told = sorted(named, key=lambda x: _GRADES.index(x[0].severity))
-    bad = [f"{f.severity}: {where}{f.channel} {f.text}" + _remedy(f) for f, where in told if f.severity != "info"]
+    bad = [
+        " ".join(filter(None, (f"{f.severity}:", where, f.channel, f"{f.text}{_remedy(f)}")))
+        for f, where in told
+        if f.severity != "info"
+    ]
     temperatures, displacements = (max(_count(r, q) for r in contents) for q in ("temperature", "displacement"))
-    head = (
-        f"{len(contents)} recording(s), {temperatures} temperatures, {displacements} displacements, "
-        f"{sum(len(r['cycles']) for r in contents)} thermal cycles: {len(bad) or 'no'} problem(s) found."
-    )
+    amounts = {
+        "recording": len(contents),
+        "temperature": temperatures,
+        "displacement": displacements,
+        "thermal cycle": sum(len(r["cycles"]) for r in contents),
+    }
+    head = f"{', '.join(_amount(n, what) for what, n in amounts.items())}: {_amount(len(bad), 'problem')} found."
     return CommandAnswer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
 
 
@@ -47,6 +54,10 @@ def _pairs(found: CheckedRecordings) -> list[tuple[Recording, Sequence[Finding]]
 
 def _count(recording: dict[str, Any], quantity: str) -> int:
     return sum(c["quantity"] == quantity for c in recording["channels"])
+
+
+def _amount(number: int, what: str) -> str:
+    return f"{number or 'no'} {what}{'' if number == 1 else 's'}"
 
 
 def _remedy(finding: Finding) -> str:

@@ -143,8 +143,8 @@ def join_two(first: Recording, second: Recording, offset: float | None = None) -
     return joined, told
 
 
-def suggest_join(recordings: Sequence[Recording]) -> str:
-    """Return the commands that join recordings of the same hours of which each has what others lack; empty if none."""
+def find_joins(recordings: Sequence[Recording]) -> list[list[str]]:
+    """Return the commands that join recordings of the same hours of which each has what others lack, as words."""
     commands = []
     for k, probes in enumerate(recordings):
         if not probes.displacements or probes.temperatures:
@@ -153,8 +153,13 @@ def suggest_join(recordings: Sequence[Recording]) -> str:
         if heats:
             names = [r.source or r.name for r in (*heats, probes)]
             number = "" if len(recordings) == len(heats) + 1 else f"-{k + 1}"
-            words = " ".join(shlex.quote(name) for name in names)
-            commands.append(f"thermocomp join {words} -o joined{number}.parquet")
+            commands.append(["thermocomp", "join", *names, "-o", f"joined{number}.parquet"])
+    return commands
+
+
+def suggest_join(recordings: Sequence[Recording]) -> str:
+    """Return the advice to join recordings, with the commands of `find_joins`; empty if there is none."""
+    commands = list(map(shlex.join, find_joins(recordings)))
     if not commands:
         return ""
     return (
