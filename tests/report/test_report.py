@@ -196,3 +196,29 @@ def test_a_name_with_a_formula_in_it_is_drawn(recording: Recording) -> None:
     channels = tuple(replace(c, name=n) for c, n in zip(recording.channels, names, strict=True))
     odd = replace(recording, table=recording.table.set_axis(names, axis=1), channels=channels, aliases={})
     assert "a$" in figures.measured(odd)
+
+
+def test_on_a_phone_in_the_dark_and_on_paper(page: str, tmp_path: Path) -> None:
+    """400 px without sideways scrolling, dark by wish, few sheets of A4, and a text in place of every figure."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.skip("chromium is not installed: apt-get install chromium (make test does)")
+    source = tmp_path / "report.html"
+    source.write_text(page, encoding="utf-8")
+    with playwright.sync_playwright() as started:
+        chromium = started.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
+        grounds = {}
+        for scheme in ("light", "dark"):
+            shown = chromium.new_page(viewport={"width": 400, "height": 900}, color_scheme=scheme)
+            shown.goto(source.as_uri())
+            assert shown.evaluate("document.documentElement.scrollWidth") <= 400
+            grounds[scheme] = shown.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert grounds == {"light": "rgb(255, 255, 255)", "dark": "rgb(20, 23, 27)"}
+        figures = shown.locator("figure svg").all()
+        assert len(figures) > 3
+        assert all((f.get_attribute("aria-label") or "").strip() for f in figures)
+        assert shown.locator("td").evaluate_all("cells => Math.max(...cells.map(c => c.textContent.length))") < 100
+        sheets = len(re.findall(rb"/Type\s*/Page[^s]", shown.pdf(prefer_css_page_size=True)))
+        chromium.close()
+    assert sheets <= 6

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
+from markupsafe import escape
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -118,9 +119,16 @@ def svg(figure: Figure) -> Drawn:
     buffer = io.StringIO()
     _save(figure, buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
-    found = Drawn(text[text.index("<svg") :])
+    label = escape("; ".join(dict.fromkeys(filter(None, map(_name_of, figure.axes)))))
+    found = Drawn(f'<svg role="img" aria-label="{label}"{text[text.index("<svg") + 4 :]}')
     found.figure = figure
     return found
+
+
+def _name_of(ax: Axes) -> str:
+    """Return what a panel shows, for readers who cannot see it: its title, else the quantities of its axes."""
+    shown = [ax.get_title(loc=where) for where in ("left", "center")] + [ax.get_ylabel(), ax.get_xlabel()]
+    return next((shorten(text, _LINE) for text in shown if text), "")
 
 
 def png(figure: Figure) -> bytes:
