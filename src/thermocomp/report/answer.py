@@ -28,7 +28,7 @@ class CommandAnswer:
         Words of the next command; empty if there is none.
     """
 
-    head: str
+    head: str = ""
     table: Layout | None = None
     lines: Sequence[PrintedLine] = ()
     warnings: Sequence[str] = ()

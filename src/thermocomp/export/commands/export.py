@@ -8,6 +8,7 @@ from typing import Any
 
 from cyclopts import Parameter
 
+from thermocomp.cli.answers import fold
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.options import CompensatorOptions
 from thermocomp.cli.terminal import console, words
@@ -89,5 +90,6 @@ def _show(found: ExportedCode, files: list[str]) -> None:
         console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
     if files:
         console.print(words(found.verdict), soft_wrap=True)
-        console.print(words(f"Written: {', '.join(files)}"), soft_wrap=True)
+        for line in fold(f"Written: {', '.join(files)}", len(files), console.width):
+            console.print(words(line), soft_wrap=True)
         console.print(words(f"Verify it as described in {files[-1]}."), soft_wrap=True)

@@ -56,7 +56,6 @@ def demo(
     code = int(fit.show(found.fit(), face))  # type: ignore[attr-defined]
     if not json:
         told = CommandAnswer(
-            head="The model file has the methods used above, fitted to all cycles.",
             files=[recording, report, model],
             following=("thermocomp", "explain", str(model)),
         )
