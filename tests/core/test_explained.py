@@ -138,9 +138,9 @@ def test_the_command_shows_all_targets(model: ErrorModel, tmp_path: Path, capsys
     path = tmp_path / "m.json"
     odd = replace(model, target="[bold]x")
     modelfile.write([model, odd], path)
-    assert run(["explain", str(path)]) == 0
+    assert run(["explain", str(path), "--details"]) == 0
     told = capsys.readouterr().out
-    assert told.strip() == str(explain_all([model, odd])).strip()
+    assert told.strip().endswith(str(explain_all([model, odd])).strip())
     assert run(["explain", str(path), "--json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert [m["target"] for m in content["models"]] == ["z_um", "[bold]x"]

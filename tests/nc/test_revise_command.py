@@ -216,7 +216,7 @@ def test_it_runs_beside_a_controller(job_folder: Path) -> None:
     code = blocked + "from thermocomp.cli.app import run\nsys.exit(run(sys.argv[1:]))"
     command = [sys.executable, "-c", code, "revise", "part.ngc", "--model", "model.json", "--cold", "-o", "out.ngc"]
     done = subprocess.run(
-        [*command, "--unproved", "--controller", "linuxcnc"], capture_output=True, text=True, check=False
+        [*command, "--unproved", "--controller", "linuxcnc", "--details"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "no picture was drawn" in " ".join(done.stdout.split())

@@ -260,4 +260,4 @@ def test_the_table_has_every_method_and_figure_that_the_requirement_names() -> N
         assert len({*cells[1:5]}) == 4  # of each method, the figures are different ones
     assert rows["arx"].sensors == 1
     assert all(1 <= rows[m].sensors <= 4 for m in papers)
-    assert all(float(cells[-1]) > 0 for cells in table.rows if cells[0] in ("mlp", "ace"))
+    assert all(float(cells[-1]) >= 0 for cells in table.rows if cells[0] in papers)

@@ -54,7 +54,9 @@ def words(page: str) -> str:
 def test_the_verdict_of_each_cycle_is_there(judged: Judged, page: str) -> None:
     (whole,) = judged.overall()
     told = words(page)
-    assert f"z_um: {whole.word}, {whole.metric('rms'):.2f} um RMS instead of {whole.none_metric('rms'):.2f} um." in told
+    stated = f"({judged.stated['z_um']:.2f} um stated in the model file)"
+    here, none = f"{whole.metric('rms'):.2f} um RMS", f"{whole.none_metric('rms'):.2f} um."
+    assert f"z_um: {whole.word}, {here} {stated} instead of {none}" in told
     assert whole.reason in told
     for unit in whole.verdict.units:
         assert unit.name in told

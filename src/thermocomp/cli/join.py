@@ -41,7 +41,7 @@ def _show(found: JoinedRecordings, path: Path | None) -> None:
     console.print(
         f"{words(path)}: {len(r)} rows, {r.time[-1] / 3600:.1f} h, {len(r.temperatures)} temperatures, "
         f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
-        + (f"; {missing} rows lack a value" if missing else ""),
+        + (f"; {missing:d} rows lack a value" if missing else ""),
         soft_wrap=True,
     )
     console.print(f"Next: thermocomp check {words(path)}", soft_wrap=True)

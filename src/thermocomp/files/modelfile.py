@@ -127,6 +127,8 @@ def drop_unused(entry: dict[str, Any]) -> dict[str, Any]:
         del entry["band"]["widening"]
     if entry["validity"] and entry["validity"]["axes"] == "not recorded":
         del entry["validity"]["axes"]
+    if entry["provenance"] and not entry["provenance"]["clocks"]:
+        del entry["provenance"]["clocks"]
     return entry
 
 

@@ -31,11 +31,11 @@ class Rules:
     margin : float or None
         Tolerated degradation in a single cycle or file [unit of the target]; None: calculated by
         `do_no_harm.margin_of`.
-    noise : float or None
-        Standard deviation of the noise of the temperatures in use [degC]; None: estimated from the recordings.
     primary : str or None
         Primary method: its verdict is found without a correction for multiple comparisons, those of the others with
         one.
+    noise : float or None
+        Standard deviation of the noise of the temperatures in use [degC]; None: estimated from the recordings.
     """
 
     margin: float | None = None
