@@ -15,8 +15,8 @@ MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 
 
 @compiled
-def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> bool:
-    """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; return False if there is none."""
+def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> None:
+    """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; without one, the first sweep ends it."""
     order = how[2]
     n = len(start)
     for j in range(len(phi)):
@@ -25,9 +25,8 @@ def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray
         if np.sqrt(dot(phi[j], phi[j]) / n) > VANISHES:
             for i in range(n):
                 total[order[j, i]] = phi[j, i]
-            return True
+            return
         phi[j] = 0.0
-    return False
 
 
 @compiled
@@ -107,8 +106,7 @@ def solve(
     errors = np.empty(max_sweeps)
     sweeps = age = 0
     moved = 0.0
-    if not _begin(how, start, phi, total, work[1]):
-        return theta, phi, 0.0, errors[:0]
+    _begin(how, start, phi, total, work[1])
     while True:
         if converged:
             before[:] = phi
