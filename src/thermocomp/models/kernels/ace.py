@@ -16,7 +16,7 @@ MOMENTUM = 0.95  # maximum momentum coefficient of the accelerated sweeps
 
 @compiled
 def _begin(how: Smoothing, start: FloatArray, phi: FloatArray, total: FloatArray, sums: FloatArray) -> None:
-    """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; if none has one, `_sweep` returns nan."""
+    """Initialise phi_j = E[S|T_j] of the first variable with a non-zero result; without one, the sweep ends it."""
     order = how[2]
     n = len(start)
     for j in range(len(phi)):
