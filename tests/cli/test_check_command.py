@@ -105,7 +105,7 @@ def test_files_of_two_loggers_are_joined_next(
     monkeypatch.chdir(tmp_path)
     recording = small_machine(dt=200.0)
     table = recording.table.assign(time_s=recording.time)
-    probes = [c for c in table if c.endswith("_um")]
+    probes = [str(c) for c in table if str(c).endswith("_um")]
     table[["time_s", *probes]].to_csv("probes.csv", index=False)
     table.drop(columns=probes).to_csv("heat.csv", index=False)
     Path("joined.parquet").touch()  # a name that is taken is not proposed
