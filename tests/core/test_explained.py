@@ -56,6 +56,17 @@ def test_a_drift_shifts_the_answer_whichever_way_it_counts(model: ErrorModel) ->
     assert shifts[0] == pytest.approx(shifts[1])
 
 
+def test_sensors_of_the_models_of_other_cycles_are_no_pairs(model: ErrorModel) -> None:
+    """A model fitted without a cycle may use other sensors: they are among those lost, and are not two."""
+    assert model.honest_error is not None
+    others = replace(model.honest_error, lost={**model.honest_error.lost, "t7_C": 2.0, "t8_C": 2.0})
+    assert explain(replace(model, honest_error=others)).pairs == (2, 1)
+    alone = {k: v for k, v in others.lost.items() if ", " not in k}
+    heat = [i for i in model.inputs if i.quantity == "temperature"]
+    none_judged = explain(replace(model, honest_error=replace(others, lost=alone)))
+    assert none_judged.pairs[0] == len(heat) * (len(heat) - 1) // 2
+
+
 def test_a_dozen_lines_say_it(model: ErrorModel) -> None:
     band = Band(0.9, "assumption", 4, 0.5, 2.0, 1.0)
     covered = Validity(4, 3, 0.2, (0.0, 3000.0), (19.0, 24.0), "t3_C", (20.0, 21.0), 2, 13.3)

@@ -62,16 +62,15 @@ def _failing(models: Sequence[Explanation]) -> list[PrintedLine]:
         return []
     held = dict.fromkeys(s.name for e in models for s in e.sensors if not s.runs_on)
     lasting = next(t.value for t in models[0].thresholds if t.name == "fault_duration")
+    number, kept_on = min((e.pairs for e in models if e.pairs[0]), key=lambda p: p[1] / p[0], default=(0, 0))
+    every = "whichever two they are" if kept_on == number else f"without at least {kept_on} of {number} pairs"
     kept = f"; without {few(list(held))} the correction is held, then fades" if held else ""
     return [
         PrintedLine(
             f"A missing reading is replaced at once, a wrong one {lasting / 60:g} min after it exceeds its limit, by "
             f"its prediction from the others{kept}."
         ),
-        PrintedLine(
-            f"Two sensors lost at once: the models run on without {min(e.pairs[1] for e in models)} of "
-            f"{max(e.pairs[0] for e in models)} pairs."
-        ),
+        *([PrintedLine(f"Two sensors lost at once: each model runs on, {every}.")] if number else []),
     ]
 
 

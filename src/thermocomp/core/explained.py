@@ -180,7 +180,8 @@ def explain(model: ErrorModel) -> Explanation:
     known = {g.name: g for g in gains(model, _ANY)} if isinstance(model, PacedDynamic) else {}
     order = list(known) if known else [i.name for i in model.inputs]
     found = model.honest_error
-    judged = [k.split(", ") for k in found.lost if k not in {i.name for i in model.inputs}] if found else []
+    # sensors of other models of the same method, fitted without a cycle, are among those lost, too
+    judged = [pair for k in found.lost if len(pair := k.split(", ")) == 2] if found else []
     heat = [i.name for i in model.inputs if model.watch and i.name in model.watch.names and i.name in model.sensors]
     pairs = judged or [list(pair) for pair in combinations(heat, 2)]
     return Explanation(
