@@ -113,6 +113,11 @@ def test_files_of_two_loggers_are_joined_next(
     said = capsys.readouterr().out
     assert "2 recordings, " in said
     assert said.rstrip().endswith("Next: thermocomp join heat.csv probes.csv -o joined-2.parquet")
+    assert run(["join", "heat.csv", "probes.csv", "-o", "joined-2.parquet"]) == 0
+    lines = capsys.readouterr().out.rstrip().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[-1] == "Next: thermocomp check joined-2.parquet"
+    assert any(line.startswith("Joined: ") for line in lines)
     for one in ("probes.csv", "heat.csv"):
         run(["check", one])
         assert "Next:" not in capsys.readouterr().out

@@ -5,6 +5,8 @@ from pathlib import Path
 from thermocomp.api.join import JoinedRecordings
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, words
+from thermocomp.report.answer import CommandAnswer
+from thermocomp.report.layout import PrintedLine
 
 
 def files_of(output: Path, _given: object) -> list[Path]:
@@ -27,21 +29,30 @@ def join(found: JoinedRecordings, face: CommandFace) -> int:
         0 done, 2 unusable input.
     """
     face.write(found.save)
-    face.show(lambda: {**found.to_dict(), "file": str(face.output)}, lambda: _show(found, face.output))
+    face.answer(
+        lambda: {**found.to_dict(), "file": str(face.output)}, lambda: _answer(found, face), lambda: _show(found)
+    )
     return 0
 
 
-def _show(found: JoinedRecordings, path: Path | None) -> None:
-    for a in found.alignments:
-        console.print(words(a), soft_wrap=True)
-        for note in a.notes:
-            console.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
+def _answer(found: JoinedRecordings, face: CommandFace) -> CommandAnswer:
     r = found.recording
     missing = int(r.table.isna().any(axis=1).sum())
-    console.print(
-        f"{words(path)}: {len(r)} rows, {r.time[-1] / 3600:.1f} h, {len(r.temperatures)} temperatures, "
-        f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)"
-        + (f"; {missing:d} rows lack a value" if missing else ""),
-        soft_wrap=True,
+    return CommandAnswer(
+        head="; ".join(map(str, found.alignments)) + ".",
+        lines=[
+            PrintedLine(
+                f"Joined: {len(r)} rows, {r.time[-1] / 3600:.1f} h, {len(r.temperatures)} temperatures, "
+                f"{len(r.displacements)} displacements, {len(r.cycles)} thermal cycle(s)."
+            )
+        ],
+        warnings=[f"{missing} rows lack a value"] if missing else [],
+        files=face.files,
+        following=("thermocomp", "check", str(face.output)),
     )
-    console.print(f"Next: thermocomp check {words(path)}", soft_wrap=True)
+
+
+def _show(found: JoinedRecordings) -> None:
+    for a in found.alignments:
+        for note in a.notes:
+            console.print(f"[dim]note[/] {words(note)}", soft_wrap=True)
