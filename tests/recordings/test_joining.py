@@ -85,6 +85,33 @@ def test_a_drift_is_told_where_it_is_clear(table: pd.DataFrame) -> None:
     assert abs(found.offset - (900 + 200e-6 * found.middle)) < found.half
 
 
+@pytest.mark.parametrize("step", [300.0, -900.0])
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5])
+def test_a_clock_that_was_set_meanwhile_is_not_corrected(table: pd.DataFrame, share: float, step: float) -> None:
+    """One offset does not hold for the whole recording, however clear it is in most of it."""
+    seconds = table["time_s"] + step * (np.arange(len(table)) > share * len(table))
+    probes = table[[*PROBES, SPEED]].assign(time_s=seconds).sort_values("time_s")
+    made = Recording.from_dataframe(probes.drop_duplicates("time_s").reset_index(drop=True), name="probes")
+    _, told = join_two(logged(table, [*HEAT, SPEED]), replace(made, start=BEGIN.isoformat()))
+    assert told.applied == 0
+    assert told.estimate is None or not told.estimate.clear
+
+
+@pytest.mark.parametrize("offset", [-900.0, 0.0, 700.0])
+def test_on_a_measured_machine(shared_data: Path, offset: float) -> None:
+    """There, the displacements seem to be 99 s before the spindle: a response alone is no proof of an offset."""
+    measured = files.read(shared_data / "fl_thermal" / "recording.csv").to_frame().iloc[:6669]
+    heat = [c for c in measured if str(c).startswith("t") and str(c).endswith("_C")]
+    probes = [c for c in measured if str(c).endswith("_um")]
+    first = logged(measured, [*heat, SPEED])
+    for columns, applied in ((probes, False), ([*probes, SPEED], offset != 0)):
+        joined, told = join_two(first, logged(measured, columns, offset))
+        assert told.estimate is not None
+        assert told.estimate.interval[0] <= offset <= told.estimate.interval[1]
+        assert (told.applied != 0) == applied
+        assert len(joined) > 6000
+
+
 def test_heat_alone_is_not_clear_and_nothing_is_applied(table: pd.DataFrame) -> None:
     joined, told = join_two(logged(table, HEAT), logged(table[3:], PROBES, 300))
     assert told.estimate is None or not told.estimate.clear
@@ -177,7 +204,7 @@ def test_files_of_two_loggers_get_the_command(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     files.write(logged(table, [*HEAT, SPEED]), "heat.csv")
-    files.write(logged(jumping(table), PROBES, 460), "my probes.csv")
+    files.write(logged(table, [*PROBES, SPEED], 460), "my probes.csv")
     command = "thermocomp join heat.csv 'my probes.csv' -o joined.parquet"
     assert [f.text for f in tc.check(["heat.csv", "my probes.csv"]).findings[0] if command in f.text]
     for verb in (tc.compare, tc.fit):

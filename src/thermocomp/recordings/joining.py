@@ -13,7 +13,8 @@ import pandas as pd
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
-from thermocomp.recordings.clockoffset import FAR, ClockOffset, agree, begin, find_offset
+from thermocomp.recordings.clockoffset import FAR, ClockOffset, agree, find_offset
+from thermocomp.recordings.clockpairs import begin
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.headings import HOUSE_SUFFIX
 from thermocomp.recordings.recording import Recording
