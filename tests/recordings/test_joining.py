@@ -101,8 +101,8 @@ def test_a_clock_that_was_set_meanwhile_is_not_corrected(table: pd.DataFrame, sh
 def test_on_a_measured_machine(shared_data: Path, offset: float) -> None:
     """There, the displacements seem to be 99 s before the spindle: a response alone is no proof of an offset."""
     measured = files.read(shared_data / "fl_thermal" / "recording.csv").to_frame().iloc[:6669]
-    heat = [c for c in measured if str(c).startswith("t") and str(c).endswith("_C")]
-    probes = [c for c in measured if str(c).endswith("_um")]
+    heat = [str(c) for c in measured if str(c).startswith("t") and str(c).endswith("_C")]
+    probes = [str(c) for c in measured if str(c).endswith("_um")]
     first = logged(measured, [*heat, SPEED])
     for columns, applied in ((probes, False), ([*probes, SPEED], offset != 0)):
         joined, told = join_two(first, logged(measured, columns, offset))
