@@ -87,6 +87,10 @@ def test_pattern_order() -> None:
     for update, same in ((batch, True), ({}, False)):
         one, other = (np.ravel(trained("fixed", x[::k], t[::k], **update).hidden_weights) for k in (1, -1))
         assert np.allclose(one, other, rtol=1e-9) is same
+    # 'fixed' is the order as given
+    start = np.random.default_rng(0).uniform(-0.3, 0.3, 5 * 5 + 6)
+    given, _ = twin.train(start, 5, x, t, rates, 0.0, batch=False, shuffled=False, seed=0, goal=0.0)
+    assert np.allclose(trained("fixed", x, t).hidden_weights, given[5:25].reshape(4, 5).T, rtol=1e-9)
 
 
 def test_shuffle_is_fair() -> None:

@@ -66,7 +66,7 @@ def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, 
     if len(answer.files) > 1:  # a single path is never cut
         written = fold(written[0], 2, console.width)
     following = _command(answer.following, console.width) if answer.following else []
-    warned = [PrintedLine(text, Toned("but ", "doubtful")) for text in answer.warnings[:1]]
+    warned = [PrintedLine(text, Toned("Warning: ", "doubtful")) for text in answer.warnings[:1]]
     left = room - len(written) - hint - len(following)
     for head, each in ((3, 2), (2, 2), (2, 1), (1, 1)):
         first = _folded(PrintedLine(answer.head), head, console) if answer.head else []
@@ -79,7 +79,7 @@ def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, 
     _print(map(words, written), console)
     if hint:
         hidden = ((rows, "rows"), (len(answer.warnings) - 1, "warnings"))
-        more = [*(f"{n} more {what}" for n, what in hidden if n > 0), "all results"]
+        more = [*(f"{n} more {what if n > 1 else what.removesuffix('s')}" for n, what in hidden if n > 0), "all results"]
         console.print(words(f"--details prints {' and '.join(more)}."), style="dim", soft_wrap=True)
     for text in following:
         console.print(text, markup=False, soft_wrap=True)  # a mark-up would double the backslashes

@@ -35,9 +35,10 @@ def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
     heat = sum(quantity == "temperature" for quantity in inputs.values())
     what = [f"{heat} temperatures", *(name for name, quantity in inputs.items() if quantity != "temperature")]
     past = "present and past values" if any(e.remembers for e in models) else "present values only"
+    number = f"{len(models)} model{'' if len(models) == 1 else 's'}"
     return CommandAnswer(
-        head=f"{len(models)} model(s) of {' and '.join(what)}, {past}; {len(accepted)} may run. RMS on unseen "
-        "cycles; leans on: largest contributions of inputs; if lost: RMS without the worst one.",
+        head=f"{number} of {' and '.join(what)} ({past}); {len(accepted)} may run. Leans on: largest contributions; "
+        "if lost: worst sensor, RMS.",
         table=Layout(_COLUMNS, models),
         lines=[*_failing(models), *spares_of(models)],
         warnings=[f"{e.target}: {e.word}, {e.reason}" for e in models if e.target not in accepted],

@@ -44,7 +44,8 @@ def few(names: Sequence[str]) -> str:
 
 def spares(wanted: Mapping[str, str]) -> list[PrintedLine]:
     """Return a line about the sensors that want a spare, each with the reason."""
-    first = next((f" ({name}: {why})" for name, why in wanted.items()), "none")
+    named = "" if len(wanted) == 1 else "{}: "
+    first = next((f" ({named.format(name)}{why})" for name, why in wanted.items()), "none")
     return [PrintedLine(f"Sensors that want a spare: {few(list(wanted))}{first}.")]
 
 

@@ -65,7 +65,7 @@ def verdict(comparison: Comparison) -> str:
     left = [t for t in targets if t not in usable]
     if not usable:
         untried = any(do_no_harm.UNTRIED in a.verdict.caps for a in comparison.overall())
-        shown = "none was shown to be better than a constant correction on unseen cycles"
+        shown = "none was accepted on unseen cycles"
         why = do_no_harm.UNTRIED if untried else shown
         return f"No model may run yet for {_list(targets)}: {why}."
     by_model: dict[str, list[str]] = {}
