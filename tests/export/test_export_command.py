@@ -65,7 +65,7 @@ def test_an_error_along_an_axis_is_not_reduced(tmp_path: Path, capsys: pytest.Ca
     )
 
 
-@pytest.mark.parametrize("dialect", ["codesys", "twincat", "scl"])
+@pytest.mark.parametrize("dialect", ["codesys", "twincat", "scl", "iec"])
 def test_structured_text_in_every_dialect(tmp_path: Path, dialect: str) -> None:
     model = written(tmp_path, watched_model("z_um"))
     command = ["export", str(model), "--to", "st", "--dialect", dialect, "--date", "2026-01-31", "-o"]
@@ -73,7 +73,8 @@ def test_structured_text_in_every_dialect(tmp_path: Path, dialect: str) -> None:
         assert run([*command, str(tmp_path / folder)]) == 0
     files = sorted(f.name for f in (tmp_path / "one").iterdir())
     assert {Path(f).suffix for f in files} == {
-        "codesys": {".st", ".md"},
+        "codesys": {".st", ".xml", ".md"},
+        "iec": {".st", ".xml", ".md"},
         "twincat": {".TcPOU", ".TcDUT", ".md"},
         "scl": {".scl", ".md"},
     }[dialect]

@@ -79,7 +79,10 @@ def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, 
     _print(map(words, written), console)
     if hint:
         hidden = ((rows, "rows"), (len(answer.warnings) - 1, "warnings"))
-        more = [*(f"{n} more {what if n > 1 else what.removesuffix('s')}" for n, what in hidden if n > 0), "all results"]
+        more = [
+            *(f"{n} more {what if n > 1 else what.removesuffix('s')}" for n, what in hidden if n > 0),
+            "all results",
+        ]
         console.print(words(f"--details prints {' and '.join(more)}."), style="dim", soft_wrap=True)
     for text in following:
         console.print(text, markup=False, soft_wrap=True)  # a mark-up would double the backslashes

@@ -33,9 +33,7 @@ def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Seq
     named = [(f, f"{r.name}:" if len(contents) > 1 else "") for r, fs in _pairs(found) for f in fs]
     told = sorted(named, key=lambda x: _GRADES.index(x[0].severity))
     bad = [
-        " ".join(filter(None, (where, f.channel, f"{f.text}{_remedy(f)}")))
-        for f, where in told
-        if f.severity != "info"
+        " ".join(filter(None, (where, f.channel, f"{f.text}{_remedy(f)}"))) for f, where in told if f.severity != "info"
     ]
     temperatures, displacements = (max(_count(r, q) for r in contents) for q in ("temperature", "displacement"))
     amounts = {

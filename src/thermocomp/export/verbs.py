@@ -116,7 +116,7 @@ def export(
         separate test.
     name : str
         Name of the files and functions, after the prefix ``tc_``.
-    dialect : {'codesys', 'twincat', 'scl'}, optional
+    dialect : {'codesys', 'twincat', 'scl', 'iec'}, optional
         Dialect of structured text. Default: codesys.
     limits : Limits
         Limits of the correction.

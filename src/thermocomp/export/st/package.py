@@ -8,6 +8,8 @@ from uuid import NAMESPACE_URL, uuid5
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
+from thermocomp.export.st.plcopen import write_project
+from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
 from thermocomp.export.st.ststatements import BAGS, Dialect
 from thermocomp.export.st.sttest import allow, write_test
@@ -20,9 +22,13 @@ from thermocomp.runtime.program.variables import RECORDS
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
 Create an object for each `TYPE`, `FUNCTION` and `FUNCTION_BLOCK` (CODESYS: Add object > DUT or POU; declaration in the
-upper part, statements in the lower part, without the `END_...` of a POU); do the same for `{name}_test.st`.""",
+upper part, statements in the lower part, without the `END_...` of a POU); do the same for `{name}_test.st`.
+Instead, `{name}.xml` can be imported at once (Project > Import PLCopenXML).""",
     "twincat": """Each `.TcDUT` and `.TcPOU` file is one object. In the PLC project, add all of them: Add > Existing
 item.""",
+    "iec": """`{name}.xml` (PLCopen XML) holds all types, functions and function blocks, and the test: import it
+(Beremiz, OpenPLC editor, CODESYS). `{name}.st` and `{name}_test.st` are the same as text. It keeps to IEC 61131-3,
+second edition, and avoids what MATIEC and STruC++ refused or ignored in the text for CODESYS.""",
     "scl": """`{name}.scl` is an external source. TIA Portal: External source files > Add new external file, then
 Generate blocks from source; do the same for `{name}_test.scl`. For S7-1500 only (it needs LReal and optimized data:
 {kilobytes} kB per instance).""",
@@ -112,7 +118,7 @@ def write_blocks(
     page = _README.format(
         facts="  \n".join(said),
         name=name,
-        dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL"}[dialect],
+        dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL", "iec": "IEC 61131-3"}[dialect],
         install=_INSTALL[dialect].format(name=name, kilobytes=_kilobytes(tables)),
         about=f"{about.lstrip()}\n" if about else "",
         calls=len(readings.age),
@@ -123,7 +129,15 @@ def write_blocks(
         files = dict(_object(unit, head) for unit in [*units, *tests])
     else:
         suffix = "scl" if dialect == "scl" else "st"
-        files = {
+        files = {}
+        if dialect != "scl":
+            plain = adapt([*units, *tests], name)
+            files[f"{name}.xml"] = write_project(plain, name, facts)
+            if dialect == "iec":
+                names = {t.name for t in tests}
+                tests = [u for u in plain if u.name.startswith(tuple(names))]
+                units = [u for u in plain if u not in tests]
+        files |= {
             f"{name}.{suffix}": _joined(units, head, dialect),
             f"{name}_test.{suffix}": _joined(tests, head, dialect),
         }

@@ -13,20 +13,22 @@ from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS
 
-Dialect = Literal["codesys", "twincat", "scl"]
+Dialect = Literal["codesys", "twincat", "scl", "iec"]
 
 TYPES: dict[Kind, str] = {"real": "LREAL", "time": "LREAL", "int": "DINT", "bool": "BOOL"}
 
 #: reserved words of the language, or names of its library, in any of the dialects
 RESERVED = frozenset(
     """
-    abs acos action add and any array asin at atan begin bool by byte case concat configuration const constant
-    continue date delete dint div do dt dword else elsif end eq exit exp expt false find floor for from function ge
-    get goto gt if in insert int interval le left len lint limit ln log lreal lt lword max method mid min mod mul
-    mux ne next not of on or override pointer private program public put read real ref reference region repeat
-    replace resource result retain return right rol ror round sel shl shr sin single sint sqrt step stop string
-    struct sub super swap tan task then this time to tod transition true trunc type udint uint ulint until usint var
-    void while with word write xor
+    abs abstract acos action add and any array asin at atan begin bool by byte case char class concat configuration
+    const constant continue cos ctd ctu ctud date delete dint div do dt dword else elsif en end eno eq exit exp expt
+    extends f_edge f_trig false final find floor for from function ge get goto gt if implements in initial_step insert
+    int interface internal interval le left len limit lint ln log lreal lt lword max method mid min mod move mul mux
+    namespace ne next non_retain not null of on or overlap override pointer private program protected public put
+    r_edge r_trig read read_only read_write real ref reference region repeat replace resource result retain return
+    right rol ror round rs rtc sel shl shr sin single sint sqrt sr step stop string struct sub super swap tan task
+    then this time to tod tof ton tp transition true trunc type udint uint ulint until usint using var void wchar
+    while with word write wstring xor
     """.split()  # noqa: SIM905 - a list with one word per line would be long
 )
 
