@@ -15,12 +15,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal
 
 import numpy as np
 
 import thermocomp as tc
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
+from thermocomp.virtual.protocol import Physics
 
 DATA = Path(os.environ.get("THERMOCOMP_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
 VORON = DATA / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv"
@@ -46,9 +48,12 @@ def thin(found: Sequence[Recording]) -> list[Recording]:
     return [rows(f, slice(None, None, every)) for f in found]
 
 
-def virtual(learned: str, judged: str | None = None, seed: int = 0, **how: str) -> Pair:
+def virtual(learned: str, judged: str | None = None, seed: int = 0, physics: Physics | None = None) -> Pair:
     """Record an experiment, and another one, or the same, with another seed."""
-    return tc.simulate(learned, seed=seed, **how), tc.simulate(judged or learned, seed=seed + 1, **how)
+    first, other = (
+        tc.simulate(e, seed=s, physics=physics) for e, s in ((learned, seed), (judged or learned, seed + 1))
+    )
+    return first, other
 
 
 def days() -> Pair:
@@ -109,16 +114,17 @@ def judge(name: str) -> tuple[float, bool]:
     shared = [c.name for c in learned[0].displacements if all(r.has(c.name) for r in unseen)]
     targets = shared[-TARGETS:]
     single = len(learned) == 1 and len(learned[0].cycles) == 1
-    how = {"split": "0.75/0.25"} if single else {"leave_one": "file" if len(learned) > 1 else "cycle"}
-    found = tc.compare(learned, targets, jobs=1, **how)
+    unit: Literal["file", "cycle"] | None = None if single else "file" if len(learned) > 1 else "cycle"
+    found = tc.compare(learned, targets, jobs=1, split="0.75/0.25" if single else None, leave_one=unit)
     noise, ratio, fine = found.comparison.noise, 1.0, True
     written = {m.target: m for m in found.fit().fitted.models}
+    methods = {t: m.provenance.method for t, m in written.items() if m.provenance}
     for target in targets:
         accepted = [a.model for a in found.comparison.overall() if a.target == target and a.accepted and a.deployable]
         best, model = found.best[target], written.get(target)
-        fine &= best is None or (model is not None and model.provenance.method == best)
+        fine &= best is None or methods.get(target) == best
         if best is None or model is None:
-            print(f"{name} {target}: none accepted; written: {model and model.provenance.method}", flush=True)
+            print(f"{name} {target}: none accepted; written: {methods.get(target)}", flush=True)
             continue
         errors, none, margin = {}, 0.0, 0.0
         for method in accepted:
