@@ -1,6 +1,7 @@
 """Directives ``requirement-table``, ``erratum-table`` and ``exhibit-table``: a table per paper, from a TOML file."""
 
 import json
+import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -54,11 +55,20 @@ def erratum(_: str, entry: Entry) -> list[str]:
     return [entry["wrong"], entry["resolution"], cited or "nothing: " + entry["reason"]]
 
 
+def caption(key: str) -> str:
+    """Return the beginning of the caption of a table or figure of a study, such as ``hwang.tables.noise``."""
+    study, kind, name = key.split(".")
+    file = FILE.parents[1] / "src" / "thermocomp" / "papers" / study / "exhibits.toml"
+    said = " ".join(tomllib.loads(file.read_text(encoding="utf-8"))[kind][name]["caption"].split())
+    return f"{kind.removesuffix('s')} '{re.split('[{:;(]', said)[0].strip(' .')}'"
+
+
 def exhibit(_: str, entry: Entry) -> list[str]:
-    """Return the cells of an equation, table or figure: what it shows, and where ours is."""
-    places = [f"``{file}``" for file in entry.get("code", ())]
-    places += [f":doc:`study <auto_papers/plot_{key.split('.')[0]}>`, ``{key}``" for key in entry.get("study", ())]
-    return [entry["what"], "; ".join([*places, *entry.get("reason", "").splitlines()])]
+    """Return the cells of an equation, table or figure: what it shows, an equation as it is here, and where ours is."""
+    places = [f":mod:`thermocomp.{file.removesuffix('.py').replace('/', '.')}`" for file in entry.get("code", ())]
+    places += [f":doc:`study <auto_papers/plot_{key.split('.')[0]}>`, {caption(key)}" for key in entry.get("study", ())]
+    what = f"{entry['what']}: ``{entry['form']}``" if "form" in entry else entry["what"]
+    return [what, "; ".join([*places, *entry.get("reason", "").splitlines()])]
 
 
 class PaperTable(SphinxDirective):
