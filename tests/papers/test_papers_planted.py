@@ -11,7 +11,7 @@ from thermocomp.models.selection.grouping import Interval
 from thermocomp.papers.chen1996 import slope
 from thermocomp.papers.common import Errors
 from thermocomp.papers.hwang import redo as hwang
-from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, TABLE_1
+from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, SINGLE, TABLE_1
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017.setup import LEAST, PURSUIT, STEPWISE
 from thermocomp.papers.study import Claim
@@ -34,10 +34,13 @@ def test_the_groups_of_hwang(exchanged: bool, verdict: str) -> None:
 def test_variables_without_grouping(without: int, verdict: str) -> None:
     """H-15: seven instead of four."""
     c: Any = SimpleNamespace(
-        grouped=SimpleNamespace(selected_=(6, 7, 1, 5)), single=SimpleNamespace(selected_=tuple(range(without)))
+        grouped=SimpleNamespace(selected_=(6, 7, 1, 5)),
+        single=SimpleNamespace(selected_=tuple(range(without))),
+        fits={SINGLE: SimpleNamespace(model=SimpleNamespace(formula=lambda: "2 (T1-T14)"))},
     )
     (claim,) = hwang.claims.judged("more", c)
     assert claim.verdict == verdict
+    assert "z = 2 (T1-T14)" in claim.finding
 
 
 @pytest.mark.parametrize(("strong", "verdict"), [((6, 7), "yes"), ((1, 7), "no")])
@@ -48,6 +51,21 @@ def test_temperatures_related_to_the_drift(strong: tuple[int, int], verdict: str
     drift = -change[:, strong[0]] - change[:, strong[1]]
     grouped = SimpleNamespace(selected_=(6, 7), contributions_=np.array([0.7, 0.7]))
     (claim,) = hwang.claims.judged("contributions", SimpleNamespace(change=change, drift=drift, grouped=grouped))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("psi", "other", "verdict"),
+    [(0.9995, 1.0, "yes"), (0.9985, 1.0, "in part"), (0.98, 1.0, "no"), (0.9995, 0.0, "not testable")],
+)
+def test_the_transformations_of_the_spindle_fit(psi: float, other: float, verdict: str) -> None:
+    """W-06: Psi is .9994 in the paper; where one temperature makes the displacement, it tests nothing."""
+    time = np.linspace(0.0, 9.0, 199)
+    warm = np.column_stack([np.sin(time), np.cos(3 * time)])
+    learned = SimpleNamespace(values=warm, deviations=(warm @ [1.0, other])[:, None])
+    ace = SimpleNamespace(psi_=psi, errors_=[1.0], falling_theta_=0.0)
+    found: Any = SimpleNamespace(found=SimpleNamespace(learned=learned, ace=ace))
+    (claim,) = spindle.claims.judged("fits", found)
     assert claim.verdict == verdict
 
 
