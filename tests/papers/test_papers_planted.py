@@ -8,7 +8,7 @@ import pytest
 
 from thermocomp.judging.robustness import Robustness
 from thermocomp.models.selection.grouping import Interval
-from thermocomp.papers.chen1996 import slope
+from thermocomp.papers.chen1996 import drift, law, slope
 from thermocomp.papers.common import Errors
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, SINGLE, TABLE_1
@@ -241,3 +241,38 @@ def test_only_the_slope_varies(monkeypatch: pytest.MonkeyPatch, bend: float, ver
     monkeypatch.setattr(slope, "residuals", lambda *_: left)
     (claim,) = slope.claims.judged("straight", slopes())
     assert (claim.verdict, claim.ours) == (verdict, f"{bend:.1%}")
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.3, "yes"), (1 / 1.3, "yes"), (1.45, "in part"), (1.55, "no")])
+def test_nets_and_regressions_are_very_close(factor: float, verdict: str) -> None:
+    """C-31: in the paper the larger error is up to 8.9 / 6.5 = 1.37 times the smaller one."""
+    mra = dict.fromkeys("xyz", 2.0)
+    typical = SimpleNamespace(net=SimpleNamespace(n_parameters_=263))
+    found: Any = SimpleNamespace(net=mra | {"y": factor * 2.0}, mra=mra, wide={}, terms=mra, typical=typical)
+    (claim,) = drift.claims.judged("close", found)
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "verdict"), [(0.96, 0.96, "yes"), (0.96, 0.94, "in part"), (0.94, 0.97, "no")]
+)
+def test_a_known_law_is_recovered(ours: float, paper: float, verdict: str) -> None:
+    """C-23: in at least 95 % of the draws, by our measurement and by that of the paper."""
+    found: Any = SimpleNamespace(
+        recoveries={
+            design: law.Recovery(law.EQ8, [law.EQ8 if k < 100 * share else {"T3": 1.0} for k in range(100)])
+            for design, share in ((law.OURS, ours), (law.DESIGNS[0], paper))
+        }
+    )
+    (claim,) = law.claims.judged("whole", found)
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("within", "verdict"), [(0.96, "yes"), (0.94, "no")])
+def test_coefficients_are_those_of_the_law(within: float, verdict: str) -> None:
+    """C-24: within three standard errors."""
+    drawn = [{t: c + (2.9 if k < 100 * within else 3.1) for t, c in law.EQ8.items()} for k in range(100)]
+    fit = SimpleNamespace(coefficient_errors=[dict.fromkeys(law.EQ8, 1.0)])
+    found: Any = SimpleNamespace(recoveries={law.OURS: law.Recovery(law.EQ8, drawn)}, fit=fit)
+    (claim,) = law.claims.judged("within", found)
+    assert claim.verdict == verdict
