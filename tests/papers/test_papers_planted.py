@@ -9,6 +9,7 @@ import pytest
 from thermocomp.judging.robustness import Robustness
 from thermocomp.models.selection.grouping import Interval
 from thermocomp.papers.chen1996 import drift, law, slope
+from thermocomp.papers.chen1996.setup import EQ8
 from thermocomp.papers.common import Errors
 from thermocomp.papers.hwang import redo as hwang
 from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, SINGLE, TABLE_1
@@ -260,7 +261,7 @@ def test_a_known_law_is_recovered(ours: float, paper: float, verdict: str) -> No
     """C-23: in at least 95 % of the draws, by our measurement and by that of the paper."""
     found: Any = SimpleNamespace(
         recoveries={
-            design: law.Recovery(law.EQ8, [law.EQ8 if k < 100 * share else {"T3": 1.0} for k in range(100)])
+            design: law.Recovery(EQ8, [EQ8 if k < 100 * share else {"T3": 1.0} for k in range(100)])
             for design, share in ((law.OURS, ours), (law.DESIGNS[0], paper))
         }
     )
@@ -271,8 +272,8 @@ def test_a_known_law_is_recovered(ours: float, paper: float, verdict: str) -> No
 @pytest.mark.parametrize(("within", "verdict"), [(0.96, "yes"), (0.94, "no")])
 def test_coefficients_are_those_of_the_law(within: float, verdict: str) -> None:
     """C-24: within three standard errors."""
-    drawn = [{t: c + (2.9 if k < 100 * within else 3.1) for t, c in law.EQ8.items()} for k in range(100)]
-    fit = SimpleNamespace(coefficient_errors=[dict.fromkeys(law.EQ8, 1.0)])
-    found: Any = SimpleNamespace(recoveries={law.OURS: law.Recovery(law.EQ8, drawn)}, fit=fit)
+    drawn = [{t: c + (2.9 if k < 100 * within else 3.1) for t, c in EQ8.items()} for k in range(100)]
+    fit = SimpleNamespace(coefficient_errors=[dict.fromkeys(EQ8, 1.0)])
+    found: Any = SimpleNamespace(recoveries={law.OURS: law.Recovery(EQ8, drawn)}, fit=fit)
     (claim,) = law.claims.judged("within", found)
     assert claim.verdict == verdict
