@@ -85,7 +85,7 @@ study.draw("fig6")
 
 study.draw("fig7")
 study.tell("W-08", "E-W8")
-study.show("Resting tool: S1", "The same with our own set", "Resting tool: ACE")
+study.show("Resting tool: s1_um", "The same with our own set", "Resting tool: ACE")
 assert numbers["tool_own_set_ace_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 assert numbers["tool_own_set_mlr_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 
