@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from board import models, rank, run, score, table
+from board import add, models, rank, run, score, table
 from cases import CASES
 from published import evaluate, read_log
 
@@ -37,6 +37,7 @@ def main() -> int:
     parser.add_argument(
         "-o", "--output", type=Path, help="folder for board.json and board.md (default: that of this script)"
     )
+    parser.add_argument("--add", action="store_true", help="add the models to the board, and keep its other rows")
     parser.add_argument("--published", metavar="MODEL", help="evaluate MODEL on the published block, append to log")
     args = parser.parse_args()
     if not args.seconds > 0:
@@ -50,10 +51,12 @@ def main() -> int:
         names, tests = chosen(args.models, entries, "model"), chosen(args.tests, CASES, "test")
         log = read_log(LOG)
         found = make({name: entries[name] for name in names}, tests, args.seconds)
+        if args.add:
+            found = add(json.loads((HERE / "board.json").read_text(encoding="utf-8")), found)
         page = table(found, log)
         print(page)
         # a part of the board does not replace the whole one, unless a folder is named
-        folder = args.output or (HERE if args.models is args.tests is None else None)
+        folder = args.output or (HERE if args.add or args.models is args.tests is None else None)
         if folder:
             folder.mkdir(parents=True, exist_ok=True)
             write_text(json.dumps(found, indent=1) + "\n", folder / "board.json", overwrite=True)

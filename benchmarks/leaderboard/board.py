@@ -10,6 +10,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from published import Line
 from work import attempt, ready
 
+from thermocomp.core.exceptions import InputError
 from thermocomp.judging.pieces import explain
 from thermocomp.models.methods import METHODS
 
@@ -60,6 +61,24 @@ def score(of: Mapping[str, Found]) -> float:
     return float(sum(f.get("share_mae", 1.0) for f in of.values()) / len(of))
 
 
+def add(board: Mapping[str, Any], found: Mapping[str, Any]) -> Found:
+    """Return a board with the models of another run, each with the commit of that run.
+
+    Raises
+    ------
+    InputError
+        The runs differ in their tests or in the data of a test.
+    """
+    known, new = board["models"], {name: {**m, "commit": found["commit"]} for name, m in found["models"].items()}
+    differing = [
+        c for c in {**board["tests"], **found["tests"]} if _of(known, c, "none_mae") != _of(new, c, "none_mae")
+    ]
+    if differing:
+        raise InputError(f"the board has other data for {', '.join(differing)}: run all models again")
+    results = {name: m["tests"] for name, m in {**known, **new}.items()}
+    return {**board, "ranking": rank(results), "models": {**known, **new}}
+
+
 def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
     """Return the board as a page of Markdown."""
     results, tests = board["models"], board["tests"]
@@ -88,11 +107,13 @@ def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
         for f in results[name]["tests"].values()
         if "error" in f
     }
+    later = "".join(f" ({name}: {results[name]['commit']})" for name in results if "commit" in results[name])
     lines = [
         "# Leaderboard",
         "",
-        f"{board['date']}, thermocomp {board['version']}, commit {board['commit']}, {board['processor']}, one thread, "
-        f"at most {board['limit']:g} s of processor time per model and test. Made by `python benchmarks/leaderboard`.",
+        f"{board['date']}, thermocomp {board['version']}, commit {board['commit']}{later}, {board['processor']}, one "
+        f"thread, at most {board['limit']:g} s of processor time per model and test. Made by `python "
+        "benchmarks/leaderboard`.",
         "",
         "Models alone, without gate and limits. Per test: mean over the channels of the mean absolute error in rows "
         "that were not used for training [um]; in brackets this error relative to that without compensation, and the "
@@ -122,7 +143,7 @@ def table(board: Mapping[str, Any], log: Sequence[Line]) -> str:
 
 
 def _of(results: Mapping[str, Any], case: str, key: str) -> str:
-    found = next((m["tests"][case][key] for m in results.values() if key in m["tests"][case]), "")
+    found = next((m["tests"][case][key] for m in results.values() if key in m["tests"].get(case, ())), "")
     return f"{found:.2f}" if isinstance(found, float) else f"{found}"
 
 

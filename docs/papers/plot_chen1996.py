@@ -18,52 +18,10 @@ on a dimension along Y, in the whole work volume, and on a milled part.
 #
 # All results below come from one call; ``thermocomp papers chen1996`` runs the same study.
 
-import textwrap
+from paper_page import Page
 
-import matplotlib.pyplot as plt
-
-from thermocomp.papers.report import papers as page
-from thermocomp.papers.studies import run
-from thermocomp.papers.study import Figure
-
-study = run("chen1996")
+study = Page("chen1996")
 numbers = study.numbers
-figures = {f.key.removeprefix("chen1996-"): f for f in study.figures}
-
-
-def draw(*keys: str) -> None:
-    """Draw figures of the study, one below the other."""
-    together = Figure("", "", [panel for key in keys for panel in figures[key].panels])
-    page.paint(together, plt.figure(figsize=page.size(together), layout="constrained"))
-    plt.show()
-
-
-def show(*numbers: int) -> None:
-    """Print tables of the study."""
-    for table in (study.tables[n] for n in numbers):
-        rows = [table.header, *table.rows]
-        widths = [max(len(r[k]) for r in rows) for k in range(len(table.header))]
-        print(table.caption)
-        for r in rows:
-            print("  ".join(cell.ljust(w) for cell, w in zip(r, widths, strict=True)).rstrip())
-        print()
-
-
-def tell(*identifiers: str) -> None:
-    """Print the paper's claims and the results here."""
-    for c in study.claims:
-        if not set(identifiers) & set(c.ids):
-            continue
-        verdict = {"yes": "-> holds", "in part": f"-> holds in part: {c.finding}", "-": ""}.get(c.verdict)
-        verdict = f"-> does not hold: {c.finding}" if verdict is None else verdict
-        paper = f"paper: {c.paper}" if c.paper else ""
-        for line in (f"{', '.join(c.ids)}: {c.text}", paper, f"ours: {c.ours}", verdict):
-            print(textwrap.fill(line, 88, subsequent_indent="    "), end="\n" if line else "")
-        print()
-
-
-judged = [c for c in study.claims if c.holds is not None]
-print(f"{sum(c.verdict == 'yes' for c in judged)} of {len(judged)} claims hold on this machine")
 
 # %%
 # 810 rows from five tests
@@ -76,8 +34,8 @@ print(f"{sum(c.verdict == 'yes' for c in judged)} of {len(judged)} claims hold o
 # tests. Differences such as T6-T7, right minus left at the column's front, are separate variables, because they bend
 # the column.
 
-tell("C-14", "C-11", "C-09")
-show(0)
+study.tell("C-14", "C-11", "C-09")
+study.show("Table 1")
 assert numbers["rows"] == 810
 assert (numbers["screening_candidates"], numbers["screening_kept"]) == (24, 9)
 assert numbers["screening_returned"] < 8
@@ -91,15 +49,15 @@ assert [numbers[f"candidates_{t}"] for t in "xyz"] == [20, 35, 20]
 # These significances assume independent rows, which is not the case: the last column of the second table gives the
 # effective sample size of the residual.
 
-tell("C-15", "C-16", "C-19", "E-C12")
-show(1, 2, 3, 4)
+study.tell("C-15", "C-16", "C-19", "E-C12")
+study.show("Table 2", "Drift in x", "Fig. 2: steps in x", "Fig. 2: steps in y")
 assert all(numbers[f"terms_{t}"] < numbers[f"candidates_{t}"] for t in "xyz")
 assert all(numbers[f"n_effective_mra_{t}"] < 810 / 2 for t in "xyz")
 
 # %%
 # Figs. 3 to 5: the measurements of the five tests, and the fit of x, y and z. One dot is one row.
 
-draw("fig3", "fig4", "fig5")
+study.draw("fig3", "fig4", "fig5")
 
 # %%
 # The neural network
@@ -110,14 +68,14 @@ draw("fig3", "fig4", "fig5")
 # claims are checked for the median error, the smallest and largest errors are reported, and the network with the median
 # error is plotted.
 
-tell("C-26", "C-28", "C-30", "C-31")
-show(5)
+study.tell("C-26", "C-28", "C-30", "C-31")
+study.show("Nets")
 assert numbers["parameters_net"] == 263
 
 # %%
 # Figs. 10 to 12: the same five tests, and the fit of the network.
 
-draw("fig10", "fig11", "fig12")
+study.draw("fig10", "fig11", "fig12")
 
 # %%
 # Eq. 5
@@ -129,8 +87,8 @@ draw("fig10", "fig11", "fig12")
 # of the printed standard error: as printed, and multiplied so that the drift has the implied size. The regression of
 # the latter has the paper's R2, and yet other terms than Eq. 5 in most draws: a good fit does not identify a law.
 
-tell("C-18")
-show(6)
+study.tell("C-18")
+study.show("Recovery of Eq. 5")
 assert abs(numbers["eq5_r2"] - 0.988) < 0.001
 assert numbers["eq5_terms_as_printed"] < numbers["eq5_terms"] < 7
 
@@ -143,16 +101,16 @@ assert numbers["eq5_terms_as_printed"] < numbers["eq5_terms"] < 7
 # slope, is modelled in place of twelve. Fig. 6: some of the profiles. Fig. 1: the yaw of Y, measured at the same
 # time.
 
-draw("fig6", "fig1")
-tell("C-22", "C-05")
-show(7, 8, 9)
+study.draw("fig6", "fig1")
+study.tell("C-22", "C-05")
+study.show("Cold profile", "Slope of Y", "Positioning of Y")
 assert numbers["slope_sets"] == 51
 assert numbers["lateral_measured_um"] < 0.2 * numbers["lateral_none_um"]
 
 # %%
 # Figs. 7 and 13: the slope over time, and the fits by regression and by the 5-8-1 network.
 
-draw("fig7", "fig13")
+study.draw("fig7", "fig13")
 
 # %%
 # Can the law be identified from 51 profiles?
@@ -176,8 +134,8 @@ draw("fig7", "fig13")
 # The network fits equally well, but has no terms that could be interpreted, and also uses inputs that are not part of
 # the law.
 
-tell("C-23", "C-24", "C-27")
-show(10, 11)
+study.tell("C-23", "C-24", "C-27")
+study.show("Recovery of a known law", "Coefficients of the known law")
 assert numbers["law_whole"] >= 0.95
 assert numbers["law_whole_cold"] < 0.8
 assert numbers["law_whole_one_warm_up"] < 0.2
@@ -190,9 +148,9 @@ assert numbers["law_elsewhere_mra"] < numbers["law_elsewhere_net"]
 # Two unseen tests, on days with different weather: 1250 1/min for 6.5 h, and a new random speed every 45 minutes.
 # ``dynamic`` is our own method; it also uses the spindle speed, and has a memory. Figs. 14 and 15:
 
-draw("fig14", "fig15")
-tell("C-32")
-show(12)
+study.draw("fig14", "fig15")
+study.tell("C-32")
+study.show("New tests")
 assert numbers["rms_z_1250_net_um"] < 0.5 * numbers["rms_z_1250_none_um"]
 assert numbers["rms_z_random_dynamic_um"] < 0.3 * numbers["rms_z_random_none_um"]
 
@@ -203,8 +161,8 @@ assert numbers["rms_z_random_dynamic_um"] < 0.3 * numbers["rms_z_random_none_um"
 # First, noise of 0.4 degC on all temperatures, including the readings of the zero; then the loss of the spindle
 # temperature, which stays at its zero without being detected. Figs. 16 and 17:
 
-draw("fig16", "fig17")
-tell("C-33", "C-34")
+study.draw("fig16", "fig17")
+study.tell("C-33", "C-34")
 assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 
 # %%
@@ -220,9 +178,9 @@ assert numbers["rms_z_1250_noise_net_um"] > numbers["rms_z_1250_net_um"]
 # models, and the remaining true error is evaluated: with the paper's regression and net, and with `dynamic` and
 # `averaged`. The protocol is in :doc:`/decisions/0016-work-volume`.
 
-tell("C-01", "C-05", "C-06", "C-35")
-draw("volume")
-show(-3, -2)
+study.tell("C-01", "C-05", "C-06", "C-35")
+study.draw("volume")
+study.show("Length of the error", "The 32 components")
 assert numbers["largest_error_net_um"] < numbers["largest_error_none_um"]
 assert numbers["volume_gain_averaged"] >= 10.0 > numbers["volume_gain_net"]
 
@@ -233,5 +191,5 @@ assert numbers["volume_gain_averaged"] >= 10.0 > numbers["volume_gain_net"]
 # The paper's last numbers are those of a cut part. Here walls and floors are milled every hour on the same two days,
 # and measured point by point with the uncertainty of a coordinate measuring machine.
 
-tell("C-37")
-show(-1)
+study.tell("C-37")
+study.show("Inspection of the part")

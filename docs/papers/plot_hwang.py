@@ -16,23 +16,10 @@ question is whether the paper's statements about the method hold.
 # %%
 # One call runs the whole study. For a claim that does not hold here the reason is given.
 
-import matplotlib.pyplot as plt
+from paper_page import Page
 
-from thermocomp.papers.report import papers as page
-from thermocomp.papers.studies import run
-
-study = run("hwang")
+study = Page("hwang")
 numbers = study.numbers
-figures = {f.key: f for f in study.figures}
-
-
-def draw(key: str) -> None:
-    """Draw a figure of the study."""
-    page.paint(figures[key], plt.figure(figsize=page.size(figures[key]), layout="constrained"))
-    plt.show()
-
-
-print(page.headline(study))
 
 # %%
 # Groups
@@ -42,7 +29,7 @@ print(page.headline(study))
 # whose correlation with one of them is above a threshold joins it. The paper does not give its threshold. The threshold
 # used here gives the same number of groups as its Table 1, or the nearest possible number.
 
-print(page.text(study, "H-03", "E-H2", "H-04", "H-07", "H-09", "H-19"))
+study.tell("H-03", "E-H2", "H-04", "H-07", "H-09", "H-19")
 assert numbers["models_tried_without_grouping"] == 8191
 assert numbers["models_tried"] < 1000
 
@@ -53,8 +40,8 @@ assert numbers["models_tried"] < 1000
 # One temperature represents each group. Of all subsets of these, the one with the smallest residual mean square
 # determines which groups are used; then every combination of their members is tried.
 
-draw("hwang-fig4")
-print(page.text(study, "H-05", "H-06", "H-15"))
+study.draw("fig4")
+study.tell("H-05", "H-06", "H-15")
 
 # %%
 # How accurate
@@ -64,9 +51,9 @@ print(page.text(study, "H-05", "H-06", "H-15"))
 # their squares. Five further tests, with other orders of the three states and different weather, were not used for
 # fitting or selection.
 
-draw("hwang-fig5")
-print(page.text(study, "H-13", "E-C12"))
-print(page.format_table(study.tables[3]))
+study.draw("fig5")
+study.tell("H-13", "E-C12")
+study.show("New tests")
 assert numbers["r_squared"] > 0.95
 assert numbers["rms_new_um"] < 0.2 * numbers["rms_new_none_um"]
 
@@ -77,15 +64,16 @@ assert numbers["rms_new_um"] < 0.2 * numbers["rms_new_none_um"]
 # Temperatures of one machine are collinear, and then the coefficients of a regression are poorly determined: their
 # variance is proportional to the sum of 1/eigenvalue of X'X. Grouping is intended to reduce this.
 
-print(page.text(study, "H-16", "H-17"))
-print(page.format_table(study.tables[1]))
+study.tell("H-16", "H-17")
+study.show("Eigenvalues of X'X")
 assert numbers["smallest_eigenvalue_degC2"] > numbers["smallest_eigenvalue_without_grouping_degC2"] > 0
 
 # %%
 # The figure shows the effect of the threshold. The more groups, the closer the fit and the larger the condition number;
 # a better fit is not always better on new tests.
 
-draw("hwang-thresholds")
+study.draw("thresholds")
+study.show("All thresholds")
 
 # %%
 # Errors of the sensors
@@ -94,7 +82,7 @@ draw("hwang-thresholds")
 # In 100 draws, a random error is added to every temperature, and R2 is computed again. The R2 of a model with
 # squares varies more than that of a linear one.
 
-draw("hwang-fig6")
-print(page.text(study, "H-18"))
-print(page.format_table(study.tables[2]))
+study.draw("fig6")
+study.tell("H-18")
+study.show("R2 under random sensor error")
 assert numbers["std_r_squared_linear"] < 0.1

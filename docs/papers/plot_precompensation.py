@@ -15,23 +15,10 @@ with NC programs that are revised as by ``thermocomp revise``, read back and mil
 # %%
 # One call runs the whole study. For a claim that does not hold here the reason is given.
 
-import matplotlib.pyplot as plt
+from paper_page import Page
 
-from thermocomp.papers.report import papers as page
-from thermocomp.papers.studies import run
-
-study = run("precompensation")
+study = Page("precompensation")
 numbers = study.numbers
-figures = {f.key: f for f in study.figures}
-
-
-def draw(key: str) -> None:
-    """Draw a figure of the study."""
-    page.paint(figures[key], plt.figure(figsize=page.size(figures[key]), layout="constrained"))
-    plt.show()
-
-
-print(page.headline(study))
 
 # %%
 # Orders of the model
@@ -40,10 +27,8 @@ print(page.headline(study))
 # The numbers of past drifts k and of past speeds m are selected by the final prediction error, which is the error one
 # step ahead with a penalty for every coefficient.
 
-print(page.text(study, "P-02"))
-print(page.format_table(study.tables[0]))
-print()
-print(page.format_table(study.tables[2]))
+study.tell("P-02")
+study.show("Final prediction error", "Orders by sampling interval")
 assert numbers["k"] >= 1
 
 # %%
@@ -54,14 +39,15 @@ assert numbers["k"] >= 1
 # production has. So all models are evaluated in free run (simulation): from the start of the test on, the speed is the
 # only input of a model. The speeds of the test do not occur in the training data.
 
-print(page.text(study, "P-03", "P-05", "E-P3"))
-draw("precompensation-fig4")
+study.tell("P-03", "P-05", "E-P3")
+study.show("Free run")
+study.draw("fig4")
 assert numbers["rms_one_step_um"] < numbers["rms_least_squares_um"] < 0.3 * numbers["rms_none_um"]
 
 # %%
 # Four models cover the whole travel of Z; between their positions the drift is interpolated.
 
-print(page.text(study, "P-04"))
+study.tell("P-04")
 
 # %%
 # The program
@@ -70,16 +56,17 @@ print(page.text(study, "P-04"))
 # Every ten minutes of the program a new correction is added to Z. Deviations are actual minus commanded, so the
 # correction is minus the deviation.
 
-print(page.text(study, "P-06"))
-draw("precompensation-schedule")
+study.tell("P-06")
+study.draw("schedule")
 
 # %%
 # A surface is milled with the cold machine, then the spindle runs at varying speeds for an hour, then another surface
 # is milled: how much deeper is the second? Eight such tests, each with different speeds.
 
-print(page.text(study, "P-07"))
-print(page.format_table(study.tables[4]))
-draw("precompensation-cut")
+study.tell("P-07")
+study.show("Depth difference between the second surface")
+study.show("Depth difference halfway")
+study.draw("cut")
 assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_difference_um"]
 
 # %%
@@ -87,10 +74,8 @@ assert numbers["depth_difference_corrected_um"] < 0.5 * numbers["depth_differenc
 # spindle speeds, four more faces. The program is revised as a file and read back as a controller reads it, and the
 # commanded positions are added to the true drift at that instant and position.
 
-print(page.format_table(study.tables[5]))
-print()
-print(page.format_table(study.tables[6]))
-draw("precompensation-surfaces")
+study.show("Depth difference with NC programs, mean of", "Depth difference with NC programs, mean over")
+study.draw("surfaces")
 assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["program_depth_difference_cold_um"]
 
 # %%
@@ -99,16 +84,16 @@ assert numbers["program_depth_difference_cold_revised_um"] < 0.5 * numbers["prog
 #
 # A program that begins while the machine is still warm from the previous one, and a changing room temperature:
 
-print(page.text(study, "E-P5", "E-P6"))
-draw("precompensation-warm")
+study.tell("E-P5", "E-P6")
+study.draw("warm")
 assert numbers["room_peak_to_peak_um"] > 1
 
 # %%
 # The same with NC programs: if the initial state is wrong by half an hour, the revised program is worse than the
 # original; with the state at the end of the last job, it is better.
 
-print(page.format_table(study.tables[7]))
-draw("precompensation-programs")
+study.show("Depth difference with NC programs revised")
+study.draw("programs")
 wrong, carried = (
     numbers[f"program_depth_difference_warm_{what}_revised_um"] for what in ("taken_for_cold", "carried_over")
 )

@@ -14,23 +14,10 @@ compares its models on-line without specifying the conditions; here this is anot
 # %%
 # One call runs the whole study. For a claim that does not hold here the reason is given.
 
-import matplotlib.pyplot as plt
+from paper_page import Page
 
-from thermocomp.papers.report import papers as page
-from thermocomp.papers.studies import run
-
-study = run("stepwise2017")
+study = Page("stepwise2017")
 numbers = study.numbers
-figures = {f.key: f for f in study.figures}
-
-
-def draw(key: str) -> None:
-    """Draw a figure of the study."""
-    page.paint(figures[key], plt.figure(figsize=page.size(figures[key]), layout="constrained"))
-    plt.show()
-
-
-print(page.headline(study))
 
 # %%
 # The test
@@ -38,7 +25,7 @@ print(page.headline(study))
 #
 # Four speeds, each followed by a standstill; three of the 24 temperatures, and the drift of X.
 
-draw("stepwise2017-fig2")
+study.draw("fig2")
 assert numbers["temperatures"] == 24
 
 # %%
@@ -47,8 +34,8 @@ assert numbers["temperatures"] == 24
 #
 # A temperature enters with a partial F of 100 or more, and leaves below 50.
 
-print(page.text(study, "T-01", "T-03", "T-06"))
-print(page.format_table(study.tables[0]))
+study.tell("T-01", "T-03", "T-06", "T-07")
+study.show("Steps of the selection")
 assert 1 <= numbers["chosen"] < 24
 
 # %%
@@ -59,9 +46,9 @@ assert 1 <= numbers["chosen"] < 24
 # measurement. The paper ran its model on a DSP; here the selected model is exported to C, compiled and given the same
 # readings (without a C compiler: its Python twin). A test runs the same loop on an emulated Cortex-M7.
 
-draw("stepwise2017-fig6")
-print(page.text(study, "T-08", "T-10"))
-print(page.format_table(study.tables[1]))
+study.draw("fig6")
+study.tell("T-08", "T-10")
+study.show("Residuals of the methods")
 assert numbers["rms_online_um"] < 0.5 * numbers["rms_online_none_um"]
 
 # %%
@@ -70,7 +57,7 @@ assert numbers["rms_online_um"] < 0.5 * numbers["rms_online_none_um"]
 #
 # The paper claims robustness without evidence. Noise on every temperature, and one sensor lost at a time:
 
-print(page.text(study, "E-T5"))
+study.tell("E-T5")
 
 # %%
 # What the thresholds mean
@@ -80,7 +67,7 @@ print(page.text(study, "E-T5"))
 # slow sampling. In addition, the rows of a drift are not independent: their effective sample size does not grow with
 # the sampling rate.
 
-draw("stepwise2017-rows")
-print(page.text(study, "E-T3", "E-C12"))
-print(page.format_table(study.tables[2]))
+study.draw("rows")
+study.tell("E-T3", "E-C12")
+study.show("Effect of the number of rows")
 assert numbers["chosen_of_fewest_rows"] <= numbers["chosen"]

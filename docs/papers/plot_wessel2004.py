@@ -16,28 +16,10 @@ compared with ours; the question is whether its statements about the methods als
 # and noise. For a claim that does not hold here the reason is given. :doc:`/virtual_machine` compares these errors with
 # those on the nonlinear machines.
 
-import matplotlib.pyplot as plt
+from paper_page import Page
 
-from thermocomp.papers.report import papers as page
-from thermocomp.papers.studies import run
-
-study = run("wessel2004")
+study = Page("wessel2004")
 numbers = study.numbers
-figures = {f.key.removeprefix("wessel2004-"): f for f in study.figures}
-
-
-def draw(key: str) -> None:
-    """Draw a figure of the study."""
-    page.paint(figures[key], plt.figure(figsize=page.size(figures[key]), layout="constrained"))
-    plt.show()
-
-
-def show(*numbers: int) -> None:
-    """Print tables of the study."""
-    print("\n\n".join(page.format_table(study.tables[n]) for n in numbers))
-
-
-print(page.headline(study))
 
 # %%
 # A finite-element spindle
@@ -46,23 +28,23 @@ print(page.headline(study))
 # Three temperatures and two displacements of a spindle without sensor errors, 199 rows of 100 s. The curves are fitted
 # to one regime of rotations. Fig. 2a: the reference series.
 
-draw("fig2a")
+study.draw("fig2a")
 
 # %%
 # Fig. 2b: the curves for the displacement at the tip (i) and for each temperature (ii to iv), the sum of the
 # temperature curves over the displacement curve (v), and the residual (vi).
 
-draw("fig2b")
-print(page.text(study, "W-06"))
+study.draw("fig2b")
+study.tell("W-06")
 assert numbers["fem_psi"] > 0.99
 
 # %%
 # Fig. 3: another regime, not used for training. Where a temperature leaves the trained range, the range check of the
 # frozen model reports it.
 
-draw("fig3")
-print(page.text(study, "W-01", "W-05", "W-07"))
-show(0, 1)
+study.draw("fig3")
+study.tell("W-01", "W-05", "W-07")
+study.show("Finite-element spindle", "ACE in the test series")
 assert numbers["fem_ace_rms_um"] < 0.5 * numbers["fem_none_rms_um"]
 
 # %%
@@ -70,7 +52,7 @@ assert numbers["fem_ace_rms_um"] < 0.5 * numbers["fem_none_rms_um"]
 # corresponds to two displacements, one while warming up and one while cooling down. No curve of a single temperature
 # can distinguish them, however nonlinear; several temperatures together can, and so can a memory (``dynamic``).
 
-draw("loops")
+study.draw("loops")
 assert numbers["fem_loop_width"] > 0.05
 assert numbers["fem_dynamic_rms_um"] < numbers["fem_ace_rms_um"]
 
@@ -82,8 +64,8 @@ assert numbers["fem_dynamic_rms_um"] < numbers["fem_ace_rms_um"]
 # many in 2004. Each set of temperatures gets a maximal correlation on each data set; sets that the Wilcoxon test for
 # paired samples cannot distinguish from the best are equivalent.
 
-print(page.text(study, "W-10", "W-11", "W-12"))
-show(2, 3)
+study.tell("W-10", "W-11", "W-12")
+study.show("Appendix B: mean Psi", "Appendix B: sets")
 assert numbers["sets_models"] == 35_259
 assert numbers["sets_small"] == 129
 assert numbers["sets_best_psi"] > 0.99
@@ -95,28 +77,28 @@ assert numbers["sets_best_psi"] > 0.99
 # The tool is heated at the bearing fit, by a hot-air gun and by a soldering iron, separately; because of a break, the
 # training data includes the fast warm-up twice. Figs. 5 and 6:
 
-draw("fig5")
-draw("fig6")
+study.draw("fig5")
+study.draw("fig6")
 
 # %%
 # Fig. 7: the tip in the independent test.
 
-draw("fig7")
-print(page.text(study, "W-08", "E-W8"))
-show(4, 5, 6)
+study.draw("fig7")
+study.tell("W-08", "E-W8")
+study.show("Resting tool: s1_um", "The same with our own set", "Resting tool: ACE")
 assert numbers["tool_own_set_ace_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 assert numbers["tool_own_set_mlr_rms_um"] < 0.1 * numbers["tool_none_rms_um"]
 
 # %%
 # The displacement over each temperature of the tool, with a loop for each:
 
-draw("tool-loops")
+study.draw("tool-loops")
 
 # %%
 # Models learned with one mounting of the tool, used with the others:
 
-print(page.text(study, "W-14"))
-show(7)
+study.tell("W-14")
+study.show("RMS of S1")
 assert numbers["transfer_worst_ace_rms_um"] < 0.2 * numbers["transfer_worst_none_rms_um"]
 
 # %%
@@ -126,13 +108,13 @@ assert numbers["transfer_worst_ace_rms_um"] < 0.2 * numbers["transfer_worst_none
 # Four days of milling at cutting speeds of 120, 200 and 370 m/min are used for training; on the fifth the speed changes
 # repeatedly. Fig. 8: the training data. The displacement is zero each morning, whatever the temperature is.
 
-draw("fig8")
+study.draw("fig8")
 
 # %%
 # Fig. 9: the fifth day.
 
-draw("fig9")
-print(page.text(study, "W-09"))
-show(8)
+study.draw("fig9")
+study.tell("W-09")
+study.show("Milling machine")
 assert numbers["milling_ace_rms_um"] < 0.5 * numbers["milling_none_rms_um"]
 assert numbers["milling_dynamic_rms_um"] < numbers["milling_ace_rms_um"]

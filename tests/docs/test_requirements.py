@@ -1,15 +1,18 @@
 """Every requirement of the papers has a test, a study that prints it, or a reason why not."""
 
 import ast
+import importlib
 import tomllib
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mutants.draw import draw
 
 ROOT = Path(__file__).resolve().parents[2]
+paper_tables: Any = importlib.import_module("paper_tables")
 #: requirements per paper
 COUNTS = {"C": 38, "W": 15, "H": 19, "P": 7, "T": 10, "X": 3}
 GROUPS = tomllib.loads((ROOT / "docs" / "requirements.toml").read_text(encoding="utf-8"))
@@ -40,7 +43,7 @@ def test_none_is_missing() -> None:
 @pytest.mark.parametrize("key", ENTRIES)
 def test_what_covers_it_is_there(key: str) -> None:
     entry = ENTRIES[key]
-    assert {*entry} <= {"what", "tests", "study", "reason"}
+    assert {*entry} <= {"what", "decides", "tests", "study", "reason"}
     assert entry["what"]
     assert ("reason" in entry) != ("tests" in entry or "study" in entry)
     for test in entry.get("tests", ()):
@@ -49,6 +52,30 @@ def test_what_covers_it_is_there(key: str) -> None:
         assert name in functions(file), f"{key}: there is no {test}"
     if "study" in entry:
         assert key in claimed(entry["study"]), f"{key}: the study {entry['study']} has no claim of it"
+
+
+@pytest.mark.parametrize("key", ENTRIES)
+def test_what_would_decide_it_is_told(key: str) -> None:
+    """If a claim does not hold in full in every run, the table of the documentation tells what would decide it."""
+    verdicts = paper_tables.verdicts().get(key, {})
+    assert ("decides" in ENTRIES[key]) == bool({*verdicts} - {"yes"})
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("H-17", "yes (1)"),
+        ("C-11", "no (1); would be decided by the rule by which Chen screened, or all his temperatures"),
+        ("T-02", "no claim: built, and decided by its tests"),
+    ],
+)
+def test_the_table_has_code_tests_mutants_and_verdict(key: str, said: str) -> None:
+    what, code, covered, verdict = paper_tables.requirement(key, ENTRIES[key])
+    assert what == ENTRIES[key]["what"]
+    assert code.split(", ")[0] == f"``{CODE['code'][key][0].partition('::')[0]}``"
+    assert all(f"``{test}``" in covered for test in ENTRIES[key]["tests"])
+    assert covered.endswith("; 2 mutants killed")
+    assert verdict == said
 
 
 def test_its_code_is_named() -> None:

@@ -147,6 +147,19 @@ def test_errors_on_a_measured_machine(tmp_path: Path, monkeypatch: pytest.Monkey
     assert rows == [("method", "``ch1_um``"), ("none", "9.0"), ("``ols``", "7.5"), ("``ace``", "4.9")]
 
 
+def test_the_page_says_what_the_measured_errors_are() -> None:
+    """W-08: the sentences below the table, from the same file."""
+    rms = json.loads(page.MEASURED.read_text(encoding="utf-8"))["rms_um"]
+    gains = {m: [rms["ols"][c] / rms[m][c] for c in rms["ols"]] for m in ("ace", "ace-monotone")}
+    better, worse = [g for g in gains["ace"] if g > 1], [1 / g for g in gains["ace"] if g < 1]
+    monotone = gains["ace-monotone"]
+    content = " ".join((ROOT / "docs" / "studies.rst").read_text(encoding="utf-8").split())
+    assert f"ACE is {min(better):.1f} to {max(better):.1f} times better than linear regression in the first" in content
+    assert f"{min(worse):.1f} to {max(worse):.1f} times worse in the other three" in content
+    assert f"it is {min(monotone):.1f} to {max(monotone):.1f} times better in all five channels" in content
+    assert ([g > 1 for g in gains["ace"]], min(monotone) > 1) == ([True, True, False, False, False], True)
+
+
 def test_the_page_shows_headlines_of_all_papers() -> None:
     content = (ROOT / "docs" / "studies.rst").read_text(encoding="utf-8")
     (lines,) = re.findall(r"headline-table::\n\n((?:   .+\n)+)", content)

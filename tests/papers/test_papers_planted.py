@@ -8,10 +8,11 @@ import pytest
 
 from thermocomp.judging.robustness import Robustness
 from thermocomp.models.selection.grouping import Interval
-from thermocomp.papers.chen1996 import slope
+from thermocomp.papers.chen1996 import drift, law, slope
+from thermocomp.papers.chen1996.setup import EQ8
 from thermocomp.papers.common import Errors
 from thermocomp.papers.hwang import redo as hwang
-from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, TABLE_1
+from thermocomp.papers.hwang.setup import JUDGED, LAWS, LINEAR, NOISES, OPTIMAL, PLAIN, QUADRATIC, SINGLE, TABLE_1
 from thermocomp.papers.stepwise2017 import redo as stepwise2017
 from thermocomp.papers.stepwise2017.setup import LEAST, PURSUIT, STEPWISE
 from thermocomp.papers.study import Claim
@@ -34,10 +35,13 @@ def test_the_groups_of_hwang(exchanged: bool, verdict: str) -> None:
 def test_variables_without_grouping(without: int, verdict: str) -> None:
     """H-15: seven instead of four."""
     c: Any = SimpleNamespace(
-        grouped=SimpleNamespace(selected_=(6, 7, 1, 5)), single=SimpleNamespace(selected_=tuple(range(without)))
+        grouped=SimpleNamespace(selected_=(6, 7, 1, 5)),
+        single=SimpleNamespace(selected_=tuple(range(without))),
+        fits={SINGLE: SimpleNamespace(model=SimpleNamespace(formula=lambda: "2 (T1-T14)"))},
     )
     (claim,) = hwang.claims.judged("more", c)
     assert claim.verdict == verdict
+    assert "z = 2 (T1-T14)" in claim.finding
 
 
 @pytest.mark.parametrize(("strong", "verdict"), [((6, 7), "yes"), ((1, 7), "no")])
@@ -48,6 +52,21 @@ def test_temperatures_related_to_the_drift(strong: tuple[int, int], verdict: str
     drift = -change[:, strong[0]] - change[:, strong[1]]
     grouped = SimpleNamespace(selected_=(6, 7), contributions_=np.array([0.7, 0.7]))
     (claim,) = hwang.claims.judged("contributions", SimpleNamespace(change=change, drift=drift, grouped=grouped))  # type: ignore[arg-type]
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("psi", "other", "verdict"),
+    [(0.9995, 1.0, "yes"), (0.9985, 1.0, "in part"), (0.98, 1.0, "no"), (0.9995, 0.0, "not testable")],
+)
+def test_the_transformations_of_the_spindle_fit(psi: float, other: float, verdict: str) -> None:
+    """W-06: Psi is .9994 in the paper; where one temperature makes the displacement, it tests nothing."""
+    time = np.linspace(0.0, 9.0, 199)
+    warm = np.column_stack([np.sin(time), np.cos(3 * time)])
+    learned = SimpleNamespace(values=warm, deviations=(warm @ [1.0, other])[:, None])
+    ace = SimpleNamespace(psi_=psi, errors_=[1.0], falling_theta_=0.0)
+    found: Any = SimpleNamespace(found=SimpleNamespace(learned=learned, ace=ace))
+    (claim,) = spindle.claims.judged("fits", found)
     assert claim.verdict == verdict
 
 
@@ -223,3 +242,38 @@ def test_only_the_slope_varies(monkeypatch: pytest.MonkeyPatch, bend: float, ver
     monkeypatch.setattr(slope, "residuals", lambda *_: left)
     (claim,) = slope.claims.judged("straight", slopes())
     assert (claim.verdict, claim.ours) == (verdict, f"{bend:.1%}")
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.3, "yes"), (1 / 1.3, "yes"), (1.45, "in part"), (1.55, "no")])
+def test_nets_and_regressions_are_very_close(factor: float, verdict: str) -> None:
+    """C-31: in the paper the larger error is up to 8.9 / 6.5 = 1.37 times the smaller one."""
+    mra = dict.fromkeys("xyz", 2.0)
+    typical = SimpleNamespace(net=SimpleNamespace(n_parameters_=263))
+    found: Any = SimpleNamespace(net=mra | {"y": factor * 2.0}, mra=mra, wide={}, terms=mra, typical=typical)
+    (claim,) = drift.claims.judged("close", found)
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("ours", "paper", "verdict"), [(0.96, 0.96, "yes"), (0.96, 0.94, "in part"), (0.94, 0.97, "no")]
+)
+def test_a_known_law_is_recovered(ours: float, paper: float, verdict: str) -> None:
+    """C-23: in at least 95 % of the draws, by our measurement and by that of the paper."""
+    found: Any = SimpleNamespace(
+        recoveries={
+            design: law.Recovery(EQ8, [EQ8 if k < 100 * share else {"T3": 1.0} for k in range(100)])
+            for design, share in ((law.OURS, ours), (law.DESIGNS[0], paper))
+        }
+    )
+    (claim,) = law.claims.judged("whole", found)
+    assert claim.verdict == verdict
+
+
+@pytest.mark.parametrize(("within", "verdict"), [(0.96, "yes"), (0.94, "no")])
+def test_coefficients_are_those_of_the_law(within: float, verdict: str) -> None:
+    """C-24: within three standard errors."""
+    drawn = [{t: c + (2.9 if k < 100 * within else 3.1) for t, c in EQ8.items()} for k in range(100)]
+    fit = SimpleNamespace(coefficient_errors=[dict.fromkeys(EQ8, 1.0)])
+    found: Any = SimpleNamespace(recoveries={law.OURS: law.Recovery(EQ8, drawn)}, fit=fit)
+    (claim,) = law.claims.judged("within", found)
+    assert claim.verdict == verdict

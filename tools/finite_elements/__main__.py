@@ -5,7 +5,7 @@ from pathlib import Path
 from finite_elements.machines import MODELS
 from finite_elements.reduction import write
 
-FOLDER = Path(__file__).parents[2] / "src" / "thermocomp" / "simulation" / "reduced"
+FOLDER = Path(__file__).parents[2] / "src" / "thermocomp" / "virtual" / "reduced"
 
 
 def main() -> None:

@@ -137,7 +137,7 @@ def reduced_tool() -> ReducedModel:
     return project(full, basis(full, more["size"], mixes, settings["regime"]), ("s1", "s2", "s3"))
 
 
-#: what makes each of the files in ``simulation/reduced``
+#: what makes each of the files in ``virtual/reduced``
 MODELS: dict[str, Callable[[], ReducedModel]] = {
     "centre": reduced_centre,
     "centre_joints": partial(reduced_centre, joints=True),

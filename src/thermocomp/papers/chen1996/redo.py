@@ -30,12 +30,7 @@ def run(seed: int, progress: Progress) -> Study:
         "chen1996",
         TITLE,
         Part(screening.claims(screened), screening.tables(screened), (), screening.numbers(screened)),
-        Part(
-            drift.claims(learned),
-            drift.tables(learned),
-            drift.figures(learned),
-            exhibits.numbers("drift", learned),
-        ),
+        Part(drift.claims(learned), drift.tables(learned), drift.figures(learned), exhibits.numbers("drift", learned)),
         Part(equation5.claims(imposed), equation5.tables(imposed), (), equation5.numbers(imposed)),
         Part(slope.judge(slopes), slope.tables(slopes), slope.figures(slopes), slope.numbers(slopes)),
         Part(unseen.claims(observed), unseen.tables(observed), unseen.figures(observed), unseen.numbers(observed)),

@@ -81,7 +81,8 @@ def _best(c: Computed) -> Facts:
 def _more(c: Computed) -> Facts:
     ours, without = c.grouped.selected_, c.single.selected_
     further = len(without) - len(ours) >= np.subtract(*setup.PAPERS_VARIABLES)
-    return {"ours": len(ours), "without": len(without), "names": named(without), "further": bool(further)}
+    facts = {"ours": len(ours), "without": len(without), "names": named(without), "further": bool(further)}
+    return facts | {"formula": c.fits[SINGLE].model.formula()}
 
 
 def _takes(c: Computed, ratio: float) -> Facts:
