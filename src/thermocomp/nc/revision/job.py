@@ -293,6 +293,11 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
         job.zero,
         job.method,
         headers.describe_bound(bounds),
+        *(
+            text
+            for c in headers.describe_conditions(job.revision, job.drift.axes)
+            for text in header.wrap_text(c.replace("%", "pct"), 1)
+        ),
         *place,
     ]
     # the first header line is the note of the revision

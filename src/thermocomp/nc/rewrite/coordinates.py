@@ -317,7 +317,8 @@ class Coordinates(CorrectionMethod):
         out = []
         for i in range(3):
             gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
-            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self.before[i] or self.contact.touching):
+            free = self.fixed[i] and self.contact.takes_up(block, gap, known=self.before[i])
+            if abs(gap) <= most or free or self.doubtful[i] or not (self.before[i] or self.contact.touching):
                 out.append(demand[i])
             else:
                 # if the least increment is greater than the step, it is the smallest possible change
