@@ -183,7 +183,7 @@ def test_a_speed_that_was_never_told() -> None:
         ("G12.1", "polar interpolation"),
         ("G7.1 C10", "cylindrical"),
         ("G66 P9000", "G65 on every line"),
-        ("G76 X1 Z-1 R1", "G85"),
+        ("G87 X1 Z-1 R1 Q1", "shifts the tool by a parameter"),
         ("M198 P1", "subprogram"),
         ("G28", "without axis words"),
         ("G10 L50", "is not supported"),

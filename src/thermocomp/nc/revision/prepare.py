@@ -91,6 +91,8 @@ def prepare_job(
         travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
         overwrite=overwrite,
     )
+    if ncprogram.has_mark(program):
+        notes.append("the byte-order mark at the beginning of the file, which no control can read, is left out")
     return job, [*notes, *guesses]
 
 

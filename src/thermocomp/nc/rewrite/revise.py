@@ -93,6 +93,8 @@ class Revision:
         By reason why a correction could not follow the drift in a cut: the largest residual [um], and its line.
     standing : int
         First line that cuts while the spindle is stopped; 0 if there is none.
+    ended : bool
+        The program has an end: M2, M30 or a closing ``%``.
     idle : int
         Number of lines with words after the end of the program, which are not corrected.
     """
@@ -118,6 +120,7 @@ class Revision:
     fastest: float = field(default=0.0, init=False)
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
     standing: int = field(default=0, init=False)
+    ended: bool = field(default=False, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
     _why: str = field(default="", init=False)  # reason that held the correction in the previous cut
@@ -150,7 +153,7 @@ class Revision:
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
-        headed = ended = False
+        headed = False
         carried = self.method.carried
         blocks = follow_program(self._read(texts), self.setup)
         for block, start, end in self.conditions.time(blocks, self.kinematics):
@@ -178,8 +181,8 @@ class Revision:
             cut = self._note_cut(block, samples, knots, demand, (end, point), top) if cutting else None
             if cut is None:
                 self._why = ""
-            self.idle += ended and bool(line.words)
-            ended |= block.ends
+            self.idle += self.ended and bool(line.words)
+            self.ended |= block.ends
             revised = Revised(
                 number=line.number,
                 text=line.text,
@@ -201,7 +204,7 @@ class Revision:
             yield revised
         if not headed:
             raise ProgramError(max(self.lines, 1), "the program is empty")
-        self._refuse_open(ended, carried)
+        self._refuse_open(carried)
 
     def _note_cut(
         self,
@@ -367,9 +370,9 @@ class Revision:
         if gap > self.held.get(self._why, (0.0, 0))[0]:
             self.held[self._why] = gap, block.line.number
 
-    def _refuse_open(self, ended: bool, carried: Vector) -> None:
+    def _refuse_open(self, carried: Vector) -> None:
         """Raise `ProgramError` if an offset would remain in force after the last line."""
-        if not ended and any(carried) and self.method.leaves_offset:
+        if not self.ended and any(carried) and self.method.leaves_offset:
             raise ProgramError(
                 self.lines,
                 "the program has no end (M2, M30 or %) at which the offset could be cancelled; add M2 or M30",
