@@ -208,8 +208,6 @@ def test_a_speed_that_was_never_told() -> None:
         ("G0 G8 P1 X5.", "on a separate line"),
         ("G99 G81 X1. Z-1. R1. F100 K0", "X with K0"),
         ("G0 X2. Y0\nG99 G81 X1. Z-1. R1. F100 L0", "X with L0"),
-        ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91", "G91 while G81 is in force"),
-        ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 X1. K3", "G91 while G81 is in force"),
         ("G0 Z5.\nG91 G81 X1. Z-1. R-2. F100\nG90 G82 X1. Z-1. R2.", "G90 while G81 is in force"),
         ("G0 Z5.\nG81 X1. Z-1. R2. F100\nG91 G28 Z0", "G91 while G81 is in force"),
         ("G0 Z5.\nG98 G81 X1. Z-1. R6. F100", "R is 1 mm above the initial level"),

@@ -69,7 +69,7 @@ def write_corners(lines: Iterable[tuple[str, int]], setup: Setup) -> Iterator[tu
         if "." not in found[2]:
             raise line.fault(f",{found[1]}{found[2]} has no decimal point; write it")
         size = float(found[2]) * (25.4 if block.modal.inch else 1.0)
-        corner = _Corner(block, found[1].upper(), size, start, [])
+        corner = _Corner(block=block, kind=found[1].upper(), size=size, start=start, between=[])
     if corner is not None:
         raise corner.block.error("a corner (,R or ,C) without a line after it; write its moves")
 

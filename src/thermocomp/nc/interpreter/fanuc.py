@@ -42,7 +42,8 @@ def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
     drilling = modal.motion in CYCLES and (told is None or told in CYCLES)
     kept = drilling and state.keeps_levels and state.level is not None
     if drilling and "distance" in groups and (groups["distance"] == "G90") != modal.absolute:
-        if not kept and (not modal.absolute or told is not None or state.level is None or modal.plane != 17):
+        plain = modal.plane == 17 and state.level is not None and told is None and "once" not in groups
+        if not kept and not (modal.absolute and plain):
             raise words.error(
                 f"{groups['distance']} while {modal.motion} is in force: whether R and Z of the cycle change their "
                 "meaning depends on the control; write G80 before it"

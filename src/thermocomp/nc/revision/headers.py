@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from thermocomp.nc.interpreter.block import system_name
 from thermocomp.nc.linuxcnc.verification.verify import Proof
-from thermocomp.nc.rewrite.conditions import Condition
+from thermocomp.nc.rewrite.conditions import Assumption
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.nc.rewrite.demand import AWAY, Elsewhere
 from thermocomp.nc.rewrite.header import wrap_text
@@ -51,7 +51,7 @@ def describe_conditions(revision: Revision, axes: Sequence[str]) -> list[str]:
     return [_describe(condition, revision, axes) for condition in revision.conditions.every]
 
 
-def _describe(condition: Condition, revision: Revision, axes: Sequence[str]) -> str:
+def _describe(condition: Assumption, revision: Revision, axes: Sequence[str]) -> str:
     counted = condition.kind in ("stop", "tool change")
     name = condition.kind + f" x{condition.count}" * counted
     if not condition.count:

@@ -25,7 +25,7 @@ from thermocomp.nc.revision.values import (
     startup_of,
     tool_of,
 )
-from thermocomp.nc.rewrite.conditions import Condition, Conditions, Kind, OtherRun
+from thermocomp.nc.rewrite.conditions import Assumption, Conditions, Kind, OtherRun
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.method import CorrectionMethod
@@ -97,7 +97,7 @@ class Way:
         """Return the top of the stock [mm]."""
         return None if self.stock_top is None else read_value(self.stock_top, "position", "--stock-top", "0 mm")
 
-    def conditions(self, every: Sequence[Condition]) -> Conditions:
+    def conditions(self, every: Sequence[Assumption]) -> Conditions:
         """Return the conditions of the bound, with the limit of messages about stops."""
         if self.stop_limit is None:
             return Conditions(every)
@@ -269,11 +269,11 @@ class Timing:
             spread_of(self.override, percent_of, "--override", "100 %, 80 % to 120 %"),
         )
 
-    def conditions(self) -> list[Condition]:
+    def conditions(self) -> list[Assumption]:
         """Return what is assumed about the times of the run, and the runs at the ends of the ranges."""
         kinds: tuple[Kind, ...] = ("stop", "tool change", "feed")
         return [
-            Condition(kind, s.text, s.value, [OtherRun(text, value) for text, value in s.ends if value != s.value])
+            Assumption(kind, s.text, s.value, [OtherRun(text, value) for text, value in s.ends if value != s.value])
             for kind, s in zip(kinds, self._spreads, strict=True)
         ]
 

@@ -12,7 +12,7 @@ from thermocomp.files import modelfile
 from thermocomp.nc.revision import forecast as forecasts
 from thermocomp.nc.revision import jobstate
 from thermocomp.nc.revision.values import Spread, read_value, spread_of
-from thermocomp.nc.rewrite.conditions import Condition, OtherRun
+from thermocomp.nc.rewrite.conditions import Assumption, OtherRun
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.inputs import SPEED, InputSignal, constants
@@ -170,7 +170,7 @@ class Starting:
         """Return the drift at the start of the program."""
         return Drift(found, self.start(found, others), others, zero=self._zero)
 
-    def conditions(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> list[Condition]:
+    def conditions(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> list[Assumption]:
         """Return what is assumed about the initial state, and the runs from other states."""
         runs = []
         if self.carried is not None:
@@ -186,7 +186,7 @@ class Starting:
             OtherRun(text, drift=Drift(found, start.carry_over(found, left, pause), others, zero=self._zero))
             for text, left, pause in runs
         ]
-        return [Condition("start", self.words(), runs=other)] if other else []
+        return [Assumption("start", self.words(), runs=other)] if other else []
 
     @property
     def _paused(self) -> Spread:

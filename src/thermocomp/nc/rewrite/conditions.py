@@ -71,7 +71,7 @@ class OtherRun:
 
 
 @dataclass
-class Condition:
+class Assumption:
     """Assumption about a run, and runs for which it is not true.
 
     Parameters
@@ -115,13 +115,13 @@ class Conditions:
 
     Parameters
     ----------
-    every : sequence of Condition
+    every : sequence of Assumption
         The conditions.
     limit : float or None
         Largest error by a stop of another duration for which no message is written [um]; None: no messages.
     """
 
-    every: Sequence[Condition] = ()
+    every: Sequence[Assumption] = ()
     limit: float | None = None
     _feeds: list[OtherRun] = field(default_factory=list, init=False)
     _seen: tuple[float, Vector | None] = field(default=(0.0, None), init=False)  # time and correction of the last cut
