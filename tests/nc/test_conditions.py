@@ -96,10 +96,17 @@ class Ending(Growing):
         return 0.0, 0.0, 60.0 * (1.0 - math.exp(-self.time / 600.0))
 
 
-def cut(folder: Path, text: str, top: float | None = None) -> Trial:
+class Sideways(Ending):
+    """The same along X."""
+
+    def deviation(self, point: Point) -> Vector:
+        return super().deviation(point)[::-1]
+
+
+def cut(folder: Path, text: str, top: float | None = None, drift: Growing | None = None) -> Trial:
     path = folder / "program.ngc"
     path.write_text(f"{BEGIN}{text}M2\n", encoding="ascii")
-    return revise(path, folder, Ending(), "coordinates", setup=STATED, split=False, stock_top=top)
+    return revise(path, folder, drift or Ending(), "coordinates", setup=STATED, split=False, stock_top=top)
 
 
 def test_the_plunge_above_the_stock_does_not_count(tmp_path: Path) -> None:
@@ -130,7 +137,22 @@ def test_a_short_feed_move_after_machine_coordinates_takes_a_step(text: str, mos
 
 
 def test_a_cut_after_machine_coordinates_at_depth_takes_steps(tmp_path: Path) -> None:
-    trial = cut(tmp_path, "G54\nG10 L2 P1 X0 Y0 Z0\nG1 Z-1\nX10\nG4 P900\nG53 G1 X20\nX40 Z-1\nX60\nG0 Z10\n")
+    text = "G54\nG10 L2 P1 X0 Y0 Z0\nG1 Z-1\nX10\nG4 P900\nG53 G1 X20\nX40\nX60\nG0 Z10\nX0\n"
+    trial = cut(tmp_path, text, drift=Sideways())
     trial.proved()
-    by_line = {row.number: row.carried[2] for row in trial.rows}
-    assert abs(by_line[10] - by_line[9]) <= 2.0 + 1e-6
+    taken = {row.number: row.carried[0] for row in trial.rows}
+    assert taken[9] == 0.0
+    assert 0.0 < -taken[10] <= 2.0 + 1e-6
+    assert -taken[13] > 30.0
+
+
+def test_the_top_of_the_stock_holds_in_the_other_runs(job_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A slow plunge after the stop: the drift changes while the tool is in the air."""
+    left = []
+    for more in ([], ["--stock-top", "0 mm"]):
+        program(f"{HOT}M5\nM0\nS6000 M3\nG0 X0 Y0 Z20\nG1 Z-0.1 F1\nG0 Z50\n")
+        capsys.readouterr()
+        assert command("--overwrite", "--json", *more) == 0
+        stop = next(c for c in json.loads(capsys.readouterr().out)["conditions"] if c["kind"] == "stop")
+        left.append(max(other["left_um"]["z"] for other in stop["others"]))
+    assert left[1] < 0.8 * left[0]
