@@ -194,6 +194,7 @@ def _expand(job: Job, program: Path, out: Path, phase: Phase) -> "array[int]":
     A program for LinuxCNC is expanded by its interpreter, one for a Fanuc by a built-in unroller.
     """
     setup, sources = job.revision.setup, array("I")
+    beside = [] if program == job.program else [job.program.parent]  # a copy is elsewhere
     with phase("expanding") as tell:
         if setup.controller == "linuxcnc":
             return expand(
@@ -203,7 +204,7 @@ def _expand(job: Job, program: Path, out: Path, phase: Phase) -> "array[int]":
                 startup=setup.startup or None,
                 diameters=job.diameters,
                 block_delete=setup.skip_optional,
-                subroutines=(job.program.parent, *job.subroutines),
+                subroutines=[*beside, *job.subroutines],
                 progress=lambda lines: tell(0.0, f"{lines:,} lines"),
             ).sources
         with ncprogram.open_to_read(program) as texts, ncprogram.open_to_write(out) as file:
