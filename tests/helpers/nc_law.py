@@ -120,9 +120,12 @@ def revise(
     setup: Setup = STATED,
     step: float = 1.0,
     split: bool = True,
+    stock_top: float | None = None,
 ) -> Trial:
     """Revise a program; `ProgramError` if it is refused."""
-    run = Revision(setup, MotionLimits(), drift, method(way, step), Demand(1.0, every), split=split)
+    run = Revision(
+        setup, MotionLimits(), drift, method(way, step), Demand(1.0, every), split=split, stock_top=stock_top
+    )
     ledger, rows = Ledger(), []
     with original.open(encoding="latin-1", newline="") as file:
         for row in run.revise(file):

@@ -43,7 +43,7 @@ def test_the_files_of_a_run(job_folder: Path, capsys: pytest.CaptureFixture[str]
     assert any("model model.json " in line and line.endswith(" for Z)") for line in header)
     assert any(line.endswith(" start cold)") for line in header)
     assert any(line.endswith(" drift relative to the start of the program)") for line in header)
-    assert any("bound Z" in line and " um" in line for line in header)
+    assert any("bound, as assumed: Z" in line and " um" in line for line in header)
 
 
 def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
@@ -55,7 +55,21 @@ def test_nothing_of_the_header_is_cut(job_folder: Path) -> None:
     assert revise(*models, "--carried", "out.ngc.job.json", *later, "--rotation", "none", out="next.ngc", start="") == 0
     header = [line for line in Path("next.ngc").read_text(encoding="ascii").splitlines() if MARK in line]
     assert [line.removeprefix(f"({MARK} ").split()[0] for line in header] == (
-        ["REVISED", "thermocomp", "program", "model", "model", "start", "drift", "method", "bound", "UNPROVED:"]
+        [
+            "REVISED",
+            "thermocomp",
+            "program",
+            "model",
+            "model",
+            "start",
+            "drift",
+            "method",
+            "bound,",
+            "stop:",
+            "tool",
+            "feed",
+            "UNPROVED:",
+        ]
     )
     assert header[5].endswith("start 2 days after out.ngc.job.json)")
     assert header[6].endswith("relative to the zero of the last job)")

@@ -94,7 +94,7 @@ def test_table_picture_and_message_tell_one_figure(
     gaps = [w for w in told["warnings"] if "could not follow" in w]
     assert any(w.endswith(f": {left:.1f} um at line {line}") for w in gaps), gaps
     header = [text for text in Path("out.ngc").read_text(encoding="ascii").splitlines() if MARK in text]
-    assert f"({MARK} bound Z {left + 2:.1f} um)" in header
+    assert f"({MARK} bound, as assumed: Z {left + 2:.1f} um)" in header
     assert revise("--overwrite") == 0
     row = next(text for text in capsys.readouterr().out.splitlines() if "│ Z" in text)
     assert row.replace("│", " ").split()[4:6] == [f"{left:.2f}", str(line)]

@@ -14,7 +14,7 @@ from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.options import Output
 from thermocomp.cli.progress import show_share
 from thermocomp.cli.terminal import console, print_table, words
-from thermocomp.nc.revision import outcome
+from thermocomp.nc.revision import headers, outcome
 from thermocomp.nc.revision.job import Done, Job
 from thermocomp.nc.revision.job import revise as revise_program
 from thermocomp.nc.revision.options import Controller, Timing, Way
@@ -113,7 +113,7 @@ def _answer(job: Job, done: Done, notes: Sequence[str]) -> CommandAnswer:
         head=f"{job.program}: {changed if done.written else outcome.explain_nothing(job, done)}; runs "
         f"{outcome.duration(revision.seconds)}; {_spindle(job)}.",
         table=_bounds(done.bounds),
-        lines=[PrintedLine(f"Start: {job.begun}; {job.method}."), *map(PrintedLine, said)],
+        lines=[PrintedLine(f"Start: {job.begun}; {job.method}."), *_conditions(job), *map(PrintedLine, said)],
         warnings=[*outcome.warnings(job, done), *notes, *outcome.describe_place(job, done)],
         files=job.paths.all() if done.written else (),
     )
@@ -135,6 +135,8 @@ def _show(job: Job, done: Done, notes: Sequence[str]) -> None:
     )
     say("", f"Start: {job.begun}; {job.method}")
     print_table(_bounds(done.bounds), console)
+    for line in _conditions(job):
+        say("", line.text)
     if (proof := done.proof) is not None:
         say(
             "[green]proved[/]",
@@ -174,6 +176,12 @@ def _bounds(bounds: Sequence[Bound]) -> Layout:
         "um; model: largest error of the model on unseen cycles; bound of a cut = residual between updates + model"
     )
     return Layout(columns, bounds, caption=caption)
+
+
+def _conditions(job: Job) -> list[PrintedLine]:
+    """Return lines about what the bound assumes, and what other runs would add to it."""
+    said = headers.describe_conditions(job.revision, job.drift.axes)
+    return [PrintedLine(f"Bound: {text}.") for text in said if not text.endswith(": none")]
 
 
 def _known(bound: Bound, value: float) -> str | float:

@@ -158,6 +158,8 @@ class Block:
         M2, M30 or the closing ``%``: nothing after the line is run.
     sticky : dict of str to float
         In a cycle: values of R, Z, Q, P ... in force, in the program's units.
+    keeps_levels : bool
+        In a cycle of a Fanuc: X and Y are incremental, but R and Z are the levels stated before in G90.
     """
 
     line: Line
@@ -178,6 +180,7 @@ class Block:
     stops: bool = False
     ends: bool = False
     sticky: dict[str, float] = field(default_factory=dict)
+    keeps_levels: bool = False
 
     def error(self, reason: str) -> ProgramError:
         """Return a `ProgramError` with the number of this line."""

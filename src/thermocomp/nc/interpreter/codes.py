@@ -9,7 +9,7 @@ from typing import Final, Literal, NamedTuple
 Controller = Literal["linuxcnc", "fanuc"]
 
 #: cycles that drill, bore or tap successive holes
-CYCLES: Final = frozenset({"G73", "G74", "G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"})
+CYCLES: Final = frozenset({"G73", "G74", "G76", "G81", "G82", "G83", "G84", "G85", "G86", "G87", "G88", "G89"})
 #: codes outside the motion group that use the axis words of their line
 TAKES_AXES: Final = frozenset({"G10", "G28", "G30", "G52", "G92"})
 AXES: Final = ("X", "Y", "Z")
@@ -124,7 +124,6 @@ _NO_POCKET = (
 )
 _WRITTEN = "--expand writes it as plain lines"
 _NO_MODAL_CALL = "modal macro calls are not supported; write G65 on every line that calls the macro"
-_NO_FINE_BORING = "it shifts the tool by a parameter of the control; use G85 or single moves"
 _NO_TCP = "tool centre point control moves the axes by more than their words; not supported"
 
 _FANUC_G: Final = (
@@ -155,7 +154,7 @@ _FANUC_G: Final = (
     Code("G68", "rotation", "rotation"),
     Code("G68.2", "rotation", "tilted plane", "tilted planes are not supported; write X Y Z"),
     Code("G69", "rotation", "rotation off"),
-    Code("G76", "motion", "fine boring", _NO_FINE_BORING),
+    Code("G76", "motion", "fine boring"),
     Code("G87", "motion", "back boring", "it shifts the tool by a parameter of the control; not supported"),
     Code("G92.1", "once", "G92 off"),
     Code("G103", "look ahead", "limits the look-ahead of the control"),
@@ -186,7 +185,13 @@ _COMMON_M: Final = (
     Code("M30", "stop", "end"),
     Code("M48", "override", "overrides on"),
     Code("M49", "override", "overrides off"),
-    Code("M99", "stop", "end of a subprogram", f"this is a subprogram, or a program without end; {_CALL}"),
+    Code(
+        "M99",
+        "stop",
+        "end of a subprogram",
+        "in a main program it starts the program again, and the correction is that of one run: write M30 instead; in a "
+        f"subprogram: {_CALL}",
+    ),
 )
 
 _LINUXCNC_M: Final = (
@@ -254,7 +259,7 @@ USED_BY: Final[dict[Controller, dict[str, frozenset[str]]]] = {
         "K": _ARCS | CYCLES,
         "L": CYCLES | {"G10"},
         "P": CYCLES | {"G4", "G5", "G8", "G10", "G30", "G54.1", "G103", "G154", "G187"},
-        "Q": frozenset({"G5.1", "G73", "G83", "G74", "G84"}),
+        "Q": frozenset({"G5.1", "G73", "G76", "G83", "G74", "G84"}),
         "R": CYCLES | _ARCS | {"G5.1", "G10", "G68"},
     },
 }

@@ -28,7 +28,7 @@ class CycleMove(NamedTuple):
 #: words that are required in the first line of a cycle and stay in force
 KEPT: Final = {
     **dict.fromkeys(("G74", "G81", "G84", "G85"), "R"),
-    **dict.fromkeys(("G82", "G86", "G89"), "RP"),
+    **dict.fromkeys(("G76", "G82", "G86", "G89"), "RP"),
     **dict.fromkeys(("G73", "G83"), "RQ"),
     "G87": "RIJK",
 }
@@ -53,7 +53,9 @@ class CannedCycle:
     level : float
         Position of the tool perpendicular to the plane at the start of the cycle, to which G98 returns.
     direct : bool
-        The tool moves from R to the next hole at level R, also in G98 (Fanuc).
+        The tool moves to the next hole at its level, also from R in G98, and up to an R above it there (Fanuc).
+    levels : bool
+        R and the depth are levels, also in G91 (Fanuc).
     """
 
     modal: Modal
@@ -63,13 +65,14 @@ class CannedCycle:
     level: float
     repeats: int = 1
     direct: bool = False
+    levels: bool = False
 
     def steps(self) -> Iterator[CycleMove]:
         """Yield the moves; their number does not change if the whole cycle is slightly shifted."""
         modal = self.modal
         first, second, across = PLANES[modal.plane]
         r, bottom = self.sticky["R"], self.sticky["XYZ"[across]]
-        if not modal.absolute:
+        if not (modal.absolute or self.levels):
             r += self.level
             bottom += r
         if r < bottom:
@@ -82,7 +85,7 @@ class CannedCycle:
 
         a, b, now = self.start[first], self.start[second], self.start[across]
         level = self.level
-        if level < r:
+        if level < r and not self.direct:
             level = now = r
         yield CycleMove(True, self._at(a, b, now))
         back = r if modal.retract == 99 else level

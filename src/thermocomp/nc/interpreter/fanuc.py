@@ -38,13 +38,21 @@ def put_in_force(state: InterpreterState, motion: str) -> None:
 def check_codes(state: InterpreterState, words: BlockWords, code: str) -> None:
     """Refuse codes that Fanuc controls interpret differently, before any part of the line takes effect."""
     modal, groups = state.modal, words.groups
-    if "distance" in groups and modal.motion in CYCLES and (groups["distance"] == "G90") != modal.absolute:
-        told = groups.get("motion")
-        if told is None or told in CYCLES:
+    told = groups.get("motion")
+    drilling = modal.motion in CYCLES and (told is None or told in CYCLES)
+    kept = drilling and state.keeps_levels and state.level is not None
+    if drilling and "distance" in groups and (groups["distance"] == "G90") != modal.absolute:
+        plain = modal.plane == 17 and state.level is not None and told is None and "once" not in groups
+        if not kept and not (modal.absolute and plain):
             raise words.error(
                 f"{groups['distance']} while {modal.motion} is in force: whether R and Z of the cycle change their "
                 "meaning depends on the control; write G80 before it"
             )
+        state.keeps_levels = kept = modal.absolute  # G91 X10. K4: more holes, with the same levels
+    if kept and (told is not None or not {"R", "Z"}.isdisjoint(words.values)):
+        raise words.error(
+            "a new cycle, R or Z in G91 while a cycle is in force that began in G90; write G80 before G91"
+        )
     if groups.get("once") == "G92.1" and not words.values.keys() >= {"X", "Y", "Z"}:
         raise words.error(
             "G92.1 without X, Y and Z: the control determines which other axes are restored; name X, Y and Z"
@@ -158,12 +166,17 @@ def drills(state: InterpreterState, words: BlockWords) -> bool:
 
 
 def _check_level(state: InterpreterState, words: BlockWords) -> None:
-    """Refuse a cycle whose R is above its initial level: the control determines when the tool moves up to R."""
+    """Refuse a cycle with G98 whose R is above its initial level: where it ends depends on the control.
+
+    With G99 all move to the hole at the initial level, up to R, and end at R.
+    """
     plane, level = state.sticky["R"] * state.scale, state.level or 0.0
-    above = plane - level if state.modal.absolute else plane
-    sure = state.level_known or not state.modal.absolute
-    if sure and above > _SAME:
+    absolute = state.modal.absolute or state.keeps_levels
+    above = plane - level if absolute else plane
+    sure = state.level_known or not absolute
+    back_to_r = absolute and state.modal.retract_stated and state.modal.retract == 99
+    if sure and above > _SAME and not back_to_r:
         raise words.error(
-            f"R is {above:g} mm above the initial level of the cycle: when the tool retracts depends on the control; "
-            "first move to the level of R"
+            f"R is {above:g} mm above the initial level of the cycle: with G98 its end depends on the control; "
+            "write G99, or first move to the level of R"
         )

@@ -213,11 +213,12 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
     frame = (modal.plane, modal.inch, modal.diameter)
     if state.level is None:
         state.level, state.level_known, state.level_frame = start[across], state.known[across], frame
+        state.keeps_levels = False
     elif state.level_frame != frame:
         raise words.error(f"{code} continues a cycle after a change of plane or unit; write G80 before the change")
     elif modal.absolute and modal.retract == 98 and not state.fanuc:
         _refuse_near_r(start[across], state.level, state.sticky["R"] * scale, words)
-    block.kind, block.sticky = "cycle", state.sticky
+    block.kind, block.sticky, block.keeps_levels = "cycle", state.sticky, state.keeps_levels
     if state.fanuc and not fanuc.drills(state, words):
         return
     repeats = words.whole("K" if "K" in values and state.fanuc else "L", least=1) or 1
@@ -230,6 +231,7 @@ def cycle(state: InterpreterState, words: BlockWords, block: Block, again: bool)
         level=state.level / scale,
         repeats=repeats,
         direct=state.fanuc,
+        levels=state.keeps_levels,
     )
     _turn_for_a_tap(state, words, block)
     block.pause += repeats * dwell_seconds(state, pause(code, state.sticky))
@@ -277,9 +279,10 @@ def _turn_for_a_tap(state: InterpreterState, words: BlockWords, block: Block) ->
 def _ends_certainly(state: InterpreterState) -> bool:
     """Return whether the level after a cycle is known: R (G99), the initial level (G98), or R in either mode."""
     modal = state.modal
-    if modal.retract_stated and modal.retract == 99 and modal.absolute:
+    absolute = modal.absolute or state.keeps_levels
+    if modal.retract_stated and modal.retract == 99 and absolute:
         return True
-    rises = state.sticky["R"] * state.scale - (state.level or 0.0 if modal.absolute else 0.0)
+    rises = state.sticky["R"] * state.scale - (state.level or 0.0 if absolute else 0.0)
     return state.level_known and (modal.retract_stated or rises >= 0.0)
 
 

@@ -51,6 +51,7 @@ class InterpreterState:
         self.last_dwell = 0.0
         self.level: float | None = None
         self.level_known = False
+        self.keeps_levels = False  # Fanuc: G91 within a cycle that began in G90
         self.level_frame = (17, False, False)
 
         self.placed()

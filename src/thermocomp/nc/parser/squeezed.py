@@ -192,7 +192,10 @@ def _complaint(text: str, place: int) -> str:
     """Return the error message for a character that starts no token."""
     letter = text[place]
     if letter == "," and text[place + 1 : place + 2] in {"R", "C", "A"}:
-        return f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; replace it with its moves"
+        mend = "" if text[place + 1] == "A" else "--expand writes it as plain moves for a Fanuc; otherwise "
+        return (
+            f"',{text[place + 1]}' (corner rounding, chamfer, angle) is not supported; {mend}replace it with its moves"
+        )
     if letter == "N":
         return "the line number N must be a whole number at the beginning of the line"
     if letter == "O":

@@ -10,6 +10,8 @@ Vector = tuple[float, float, float]
 
 #: fraction of the acceleration available across the path, and fraction then left along an arc
 ACROSS, ALONG = math.sqrt(0.75), 0.5
+#: moves that follow the spindle, whatever the feed override
+_SYNCHRONISED = frozenset(("G33", "G33.1", "G74", "G84"))
 #: minimum duration of every segment [cycles]
 LEAST = 1.02
 
@@ -106,10 +108,15 @@ class Segments:
         Maximum feed rate along the path [mm/s].
     rotary : tuple of float
         Maximum speed and acceleration of a rotary axis [deg/s, deg/s2].
+    override : float
+        Fraction of the programmed feed; threads and taps are not affected.
     """
 
-    def __init__(self, speeds: Vector, accelerations: Vector, feed: float, rotary: tuple[float, float]) -> None:
+    def __init__(
+        self, speeds: Vector, accelerations: Vector, feed: float, rotary: tuple[float, float], override: float
+    ) -> None:
         self.speeds, self.accelerations, self.feed, self.rotary = speeds, accelerations, feed, rotary
+        self.override = override
 
     def of(self, serial: int, move: Move, block: Block) -> Segment | None:
         """Return the segment of a move; None if it has no length."""
@@ -153,7 +160,7 @@ class Segments:
         speed = length / move.seconds if move.seconds else move.feed / 60.0
         if not speed > 0.0:
             raise block.error("a feed move, but no feed is in force: write F before it")
-        return min(speed, self.feed)
+        return min(speed * (1.0 if block.modal.motion in _SYNCHRONISED else self.override), self.feed)
 
     def _arc(self, serial: int, move: Move, block: Block) -> Segment:
         """Return the segment of an arc or a helix."""

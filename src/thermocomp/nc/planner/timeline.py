@@ -55,6 +55,8 @@ class MotionLimits:
         Delay of the program by a change of the spindle speed [s].
     cycle : float
         Interpolation cycle of the controller [s].
+    override : float
+        Fraction of the programmed feed, as set by the operator.
 
     Raises
     ------
@@ -71,13 +73,14 @@ class MotionLimits:
     stop: float = 60.0
     spindle: float = 1.0
     cycle: float = 0.001
+    override: float = 1.0
 
     def __post_init__(self) -> None:
         for key in ("rapid", "acceleration"):
             numbers = getattr(self, key)
             if not all(0 < v < math.inf for v in numbers):
                 raise SettingError(f"{numbers}: must be positive", (key,))
-        for key in ("feed", "rotary_rapid", "rotary_acceleration", "cycle"):
+        for key in ("feed", "rotary_rapid", "rotary_acceleration", "cycle", "override"):
             if not getattr(self, key) > 0:
                 raise SettingError(f"{getattr(self, key)}: must be positive", (key,))
         for key in ("tool_change", "stop", "spindle"):
@@ -128,7 +131,7 @@ class _Plan:
         x, y, z = kinematics.rapid
         speeds = (x / 60.0, y / 60.0, z / 60.0)
         rotary = (kinematics.rotary_rapid / 60.0, kinematics.rotary_acceleration)
-        self.segments = Segments(speeds, kinematics.acceleration, kinematics.feed / 60.0, rotary)
+        self.segments = Segments(speeds, kinematics.acceleration, kinematics.feed / 60.0, rotary, kinematics.override)
         self.corners = Corners(speeds, kinematics.acceleration, kinematics.cycle)
         self.now = 0.0  #: end time of the timed segments [s]
         self.since = 0.0  #: end time of the completed blocks [s]

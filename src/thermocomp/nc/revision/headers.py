@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from thermocomp.nc.interpreter.block import system_name
 from thermocomp.nc.linuxcnc.verification.verify import Proof
+from thermocomp.nc.rewrite.conditions import Assumption
 from thermocomp.nc.rewrite.course import Bound
 from thermocomp.nc.rewrite.demand import AWAY, Elsewhere
 from thermocomp.nc.rewrite.header import wrap_text
@@ -17,12 +18,14 @@ _MODELS, _PLACE = 2, 3
 _ALWAYS = 7
 
 
-def count_lines(models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool) -> int:
+def count_lines(
+    models: Sequence[str], taken: Sequence[str], states: str, *, by_position: bool, conditions: int = 0
+) -> int:
     """Return the number of lines of a header, before their content is known."""
     told = min(len(models), _MODELS) + len(told_taken(taken))
     # plus one line: the settings without which the original does not run are only known later
     proof = len(wrap_text(f"proved {states}")) + 1 if states else 1
-    return _ALWAYS + told + _PLACE * by_position + proof
+    return _ALWAYS + conditions + told + _PLACE * by_position + proof
 
 
 def describe_models(models: Sequence[str]) -> list[str]:
@@ -38,9 +41,27 @@ def told_taken(taken: Sequence[str]) -> list[str]:
 
 def describe_bound(bounds: Sequence[Bound]) -> str:
     """Return the line about the error bounds of the tool position in the cuts."""
-    return "bound " + ", ".join(
+    return "bound, as assumed: " + ", ".join(
         f"{b.axis} {b.most:.1f} um" if math.isfinite(b.most) else f"{b.axis} not known" for b in bounds
     )
+
+
+def describe_conditions(revision: Revision, axes: Sequence[str]) -> list[str]:
+    """Return a line for each assumption of the bound: what was assumed, and what its range would add."""
+    return [_describe(condition, revision, axes) for condition in revision.conditions.every]
+
+
+def _describe(condition: Assumption, revision: Revision, axes: Sequence[str]) -> str:
+    counted = condition.kind in ("stop", "tool change")
+    name = condition.kind + f" x{condition.count}" * counted
+    if not condition.count:
+        return f"{condition.kind}: none"
+    said = f"{name} as {condition.taken}"
+    if not condition.runs:
+        return said
+    added = condition.added(revision.left)
+    worth = [f"{a} {added[k]:.{0 if added[k] >= 9.95 else 1}f}" for k, a in enumerate("XYZ") if a in axes]
+    return f"{said}: {' to '.join(run.text for run in condition.runs)} adds {', '.join(worth)} um"
 
 
 def describe_proof(proof: Proof | None, lines: int) -> list[str]:

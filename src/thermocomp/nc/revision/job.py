@@ -13,6 +13,7 @@ from typing import NamedTuple, TextIO
 from thermocomp import __version__
 from thermocomp.core.exceptions import InputError, ProgramError
 from thermocomp.files.draft import drafts
+from thermocomp.nc.expansion.corners import write_corners
 from thermocomp.nc.expansion.unroll import unroll
 from thermocomp.nc.linuxcnc.expansion.expand import expand
 from thermocomp.nc.linuxcnc.verification.verify import Ledger, Proof, prove
@@ -26,8 +27,8 @@ from thermocomp.nc.thermal.drift import Drift
 
 #: remedy in the error for a program that cannot be verified
 ALL_THE_SAME = "--unproved writes it anyway, and its header states this"
-#: names of the draft program and diff, whose header is still blank
-PROGRAM, DIFF = "program", "diff"
+#: names of the draft program and diff, whose header is still blank, and of the original without a byte-order mark
+PROGRAM, DIFF, ORIGINAL = "program", "diff", "original"
 #: larger programs are checked completely before their revision, which takes long [bytes]
 LONG = 2_000_000
 #: number of lines between progress reports
@@ -136,10 +137,10 @@ def _revise(job: Job, phase: Phase) -> Done:
     # the program is published last: if it exists, all other files exist
     with drafts(paths.all()[::-1], overwrite=job.overwrite) as started:
         folder = started[paths.program].parent
-        source, lines = job.program, None
+        source, lines = ncprogram.copy_without_mark(job.program, folder / ORIGINAL), None
         if paths.expanded is not None:
-            source = started[paths.expanded]
-            lines = _expand(job, source, phase)
+            plain, source = source, started[paths.expanded]
+            lines = _expand(job, plain, source, phase)
         ledger, course = Ledger(), Course()
         watching = () if job.travel is None else (job.travel,)
         begin = time.perf_counter()
@@ -161,6 +162,11 @@ def _revise(job: Job, phase: Phase) -> Done:
             return Done(run, bounds, written=False, proof=None, seconds=took, proving=0.0)
         begin = time.perf_counter()
         proof = None
+        if not job.unproved and not job.revision.ended:
+            raise ProgramError(
+                job.revision.lines,
+                "the program has no end, and LinuxCNC's interpreter does not run it: add M2 or M30 as its last line",
+            )
         if not job.unproved:
             with phase("proving") as tell:
                 proof = _proved(job, source, folder / PROGRAM, ledger, tell)
@@ -182,26 +188,27 @@ def _revise(job: Job, phase: Phase) -> Done:
         return Done(run, bounds, written=True, proof=proof, seconds=took, proving=time.perf_counter() - begin)
 
 
-def _expand(job: Job, out: Path, phase: Phase) -> "array[int]":
-    """Write the program as plain lines, and return for each the number of its line in the program; 0 if it has none.
+def _expand(job: Job, program: Path, out: Path, phase: Phase) -> "array[int]":
+    """Write a program as plain lines, and return for each the number of its line in the program; 0 if it has none.
 
     A program for LinuxCNC is expanded by its interpreter, one for a Fanuc by a built-in unroller.
     """
     setup, sources = job.revision.setup, array("I")
+    beside = [] if program == job.program else [job.program.parent]  # a copy is elsewhere
     with phase("expanding") as tell:
         if setup.controller == "linuxcnc":
             return expand(
-                job.program,
+                program,
                 out,
                 inch=setup.inch,
                 startup=setup.startup or None,
                 diameters=job.diameters,
                 block_delete=setup.skip_optional,
-                subroutines=job.subroutines,
+                subroutines=[*beside, *job.subroutines],
                 progress=lambda lines: tell(0.0, f"{lines:,} lines"),
             ).sources
-        with ncprogram.open_to_read(job.program) as texts, ncprogram.open_to_write(out) as file:
-            for text, line in unroll(program_lines(texts), setup):
+        with ncprogram.open_to_read(program) as texts, ncprogram.open_to_write(out) as file:
+            for text, line in write_corners(unroll(program_lines(texts), setup), setup):
                 file.write(text)
                 sources.append(line)
     return sources
@@ -228,6 +235,7 @@ def _write(
     def told(texts: Iterator[str], program: TextIO, rows: TextIO) -> Iterator[tuple[str, tuple[str, ...]]]:
         nonlocal blank
         read = number = 0
+        mark = ncprogram.MARK.decode("latin-1") * (job.paths.expanded is None and ncprogram.has_mark(job.program))
         for revised in job.revision.revise(texts):
             program.writelines(revised.texts)
             number += len(revised.texts)
@@ -240,7 +248,8 @@ def _write(
                     tell(read / size, f"line {revised.number}")
             else:
                 blank = revised.texts
-            yield revised.text, revised.texts
+            # the diff is one of the file as it is, with its byte-order mark
+            yield mark * (revised.number == 1) + revised.text, revised.texts
 
     with (
         ncprogram.open_to_read(source) as texts,
@@ -293,6 +302,11 @@ def _facts(job: Job, bounds: Sequence[Bound], proof: Proof | None) -> list[str]:
         job.zero,
         job.method,
         headers.describe_bound(bounds),
+        *(
+            text
+            for c in headers.describe_conditions(job.revision, job.drift.axes)
+            for text in header.wrap_text(c.replace("%", "pct"), 1)
+        ),
         *place,
     ]
     # the first header line is the note of the revision

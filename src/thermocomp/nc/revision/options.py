@@ -14,14 +14,18 @@ from thermocomp.files.machines import read_machine
 from thermocomp.nc.interpreter.block import Setup, triple
 from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.revision.values import (
+    Spread,
     m_code_of,
     origin_of,
+    percent_of,
     point_of,
     read_value,
     rotations_of,
+    spread_of,
     startup_of,
     tool_of,
 )
+from thermocomp.nc.rewrite.conditions import Assumption, Conditions, Kind, OtherRun
 from thermocomp.nc.rewrite.coordinates import Coordinates
 from thermocomp.nc.rewrite.demand import Demand
 from thermocomp.nc.rewrite.method import CorrectionMethod
@@ -51,6 +55,13 @@ class Way:
     safe_z : str
         Work coordinate Z at and above which the tool is up and there is no cut. Default: the tool counts as up after a
         rapid that lifts it (coordinates), or after tool changes and moves of Z in machine coordinates (offset).
+    stock_top : str
+        Work coordinate Z of the top of the stock: above it feed moves do not count as cuts in the residual and the
+        bound. Default: every feed move counts, also the start of a plunge in the air.
+    stop_limit : str
+        Largest error that a stop of another duration, within the range of --stop, may cause in the cuts right after it.
+        Where it may cause more, a message before the stop tells the operator below which duration to wait and above
+        which to probe. Default: no messages.
     no_split : bool
         Do not split long cuts. Default: a cut is split where a linear change of the correction over it would be wrong
         by more than one correction step at mid-cut (method coordinates, linuxcnc).
@@ -69,6 +80,8 @@ class Way:
     step: str = "1 um"
     largest: str = "400 um"
     safe_z: str | None = None
+    stock_top: str | None = None
+    stop_limit: str | None = None
     no_split: bool = False
     expand: bool = False
     subroutines: list[Path] | None = None
@@ -79,6 +92,18 @@ class Way:
         every = None if self.every is None else read_value(self.every, "time", "--every", "10 min", positive=True)
         tolerance = read_value(self.tolerance, "displacement", "--tolerance", "1 um", positive=True)
         return Demand(tolerance, every, read_value(self.largest, "displacement", "--largest", "400 um", positive=True))
+
+    def top(self) -> float | None:
+        """Return the top of the stock [mm]."""
+        return None if self.stock_top is None else read_value(self.stock_top, "position", "--stock-top", "0 mm")
+
+    def conditions(self, every: Sequence[Assumption]) -> Conditions:
+        """Return the conditions of the bound, with the limit of messages about stops."""
+        if self.stop_limit is None:
+            return Conditions(every)
+        if not any(c.kind == "stop" and c.runs for c in every):
+            raise InputError('--stop-limit requires a range of stops, such as --stop "60 s, 0 s to 20 min"')
+        return Conditions(every, read_value(self.stop_limit, "displacement", "--stop-limit", "5 um", positive=True))
 
     def made(self, setup: Setup, axes: Sequence[str]) -> CorrectionMethod:
         """Return the correction method with its settings."""
@@ -214,30 +239,54 @@ class Timing:
     machine : Path
         Machine file (.toml) with rapid rates and accelerations of the axes; its structure gives the rotary axes.
     tool_change : str
-        Duration of a tool change.
+        Duration of a tool change, and its range: what the ends of the range would add to the bound is printed. One
+        value alone, such as "8 s": it is certain.
     stop : str
-        Duration of the operator stops at M0 and M1.
+        Duration of the operator stops at M0 and M1, and its range.
+    override : str
+        Feed override, and its range.
     """
 
     machine: Path | None = None
-    tool_change: str = "8 s"
-    stop: str = "60 s"
+    tool_change: str = "8 s, 3 s to 40 s"
+    stop: str = "60 s, 0 s to 20 min"
+    override: str = "100 %, 80 % to 120 %"
 
     def read(self) -> Machine | None:
         """Return the machine in the machine file; None without one."""
         return None if self.machine is None else read_machine(self.machine)
 
+    @property
+    def _spreads(self) -> tuple[Spread, Spread, Spread]:
+        """Durations of stops and tool changes [s], and the feed override."""
+
+        def duration(text: str, option: str, example: str) -> Spread:
+            return spread_of(text, lambda t: read_value(t, "time", option, example.partition(",")[0]), option, example)
+
+        return (
+            duration(self.stop, "--stop", "60 s, 0 s to 20 min"),
+            duration(self.tool_change, "--tool-change", "8 s, 3 s to 40 s"),
+            spread_of(self.override, percent_of, "--override", "100 %, 80 % to 120 %"),
+        )
+
+    def conditions(self) -> list[Assumption]:
+        """Return what is assumed about the times of the run, and the runs at the ends of the ranges."""
+        kinds: tuple[Kind, ...] = ("stop", "tool change", "feed")
+        return [
+            Assumption(kind, s.text, s.value, [OtherRun(text, value) for text, value in s.ends if value != s.value])
+            for kind, s in zip(kinds, self._spreads, strict=True)
+        ]
+
     def kinematics(self, machine: Machine | None) -> tuple[MotionLimits, list[str]]:
         """Return the dynamics of the machine, and notes on those that are assumed."""
-        change = read_value(self.tool_change, "time", "--tool-change", "8 s")
-        stop = read_value(self.stop, "time", "--stop", "60 s")
+        stop, change, override = (s.value for s in self._spreads)
         if machine is None:
             guess = "no --machine: the times are those of a medium machining centre (rapids 30 m/min, 3 m/s2)"
-            return MotionLimits(tool_change=change, stop=stop), [guess]
+            return MotionLimits(tool_change=change, stop=stop, override=override), [guess]
         axes = sorted((a for a in machine.axes if a.name in "XYZ"), key=lambda a: a.name)
         notes = [
             f"{self.machine}: no {what} of {', '.join(silent)}: assumed to be {taken}"
             for what, taken in (("rapid", "30 m/min"), ("acceleration", "3 m/s2"))
             if (silent := [a.name for a in axes if getattr(a, what) is None])
         ]
-        return MotionLimits.of(machine, tool_change=change, stop=stop), notes
+        return MotionLimits.of(machine, tool_change=change, stop=stop, override=override), notes

@@ -149,6 +149,18 @@ def content(job: Job, done: Done, notes: Sequence[str]) -> dict[str, Any]:
             }
             for b in done.bounds
         ],
+        "conditions": [
+            {
+                "kind": c.kind,
+                "taken": c.taken,
+                "count": c.count,
+                "others": [
+                    {"taken": run.text, "left_um": dict(zip("xyz", run.left.most, strict=True))} for run in c.runs
+                ],
+                "adds_um": dict(zip("xyz", c.added(revision.left), strict=True)),
+            }
+            for c in revision.conditions.every
+        ],
         "proof": None if done.proof is None else _proof(done.proof),
         "other_offset_um": dict(zip("xyz", revision.elsewhere.most, strict=True)) if job.drift.by_position else None,
         "warnings": warnings(job, done),

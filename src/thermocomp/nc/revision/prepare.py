@@ -53,6 +53,7 @@ def prepare_job(
     method = way.made(setup, drift.driven)
     models = _files(found, drifting.hashes())
     taken = tuple(dict.fromkeys(h.taken for s in found if (h := s.model.honest_error) is not None and h.taken))
+    conditions = way.conditions([*timing.conditions(), *starting.conditions(found, others)])
     states = "" if way.unproved else foresee_sentence(setup)
     revision = Revision(
         setup=setup,
@@ -60,8 +61,12 @@ def prepare_job(
         drift=drift,
         method=method,
         demand=way.demand(),
-        header_lines=headers.count_lines(models, taken, states, by_position=drift.by_position),
+        header_lines=headers.count_lines(
+            models, taken, states, by_position=drift.by_position, conditions=len(conditions.every)
+        ),
         split=not way.no_split,
+        conditions=conditions,
+        stock_top=way.top(),
     )
     _check_interpreter(way, setup, diameters=controller.diameter is not None)
     if way.expand and setup.controller == "linuxcnc" and controller.block_delete is None:
@@ -86,6 +91,8 @@ def prepare_job(
         travel=None if machine is None else Travel({a.name: a.travel for a in machine.axes}),
         overwrite=overwrite,
     )
+    if ncprogram.has_mark(program):
+        notes.append("the byte-order mark at the beginning of the file, which no control can read, is left out")
     return job, [*notes, *guesses]
 
 

@@ -11,7 +11,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.files import modelfile
 from thermocomp.nc.revision import forecast as forecasts
 from thermocomp.nc.revision import jobstate
-from thermocomp.nc.revision.values import read_value
+from thermocomp.nc.revision.values import Spread, read_value, spread_of
+from thermocomp.nc.rewrite.conditions import Assumption, OtherRun
 from thermocomp.nc.thermal import start
 from thermocomp.nc.thermal.drift import Drift
 from thermocomp.nc.thermal.inputs import SPEED, InputSignal, constants
@@ -22,6 +23,8 @@ Zero = Literal["start", "cold", "last"]
 
 #: largest range of a temperature that may be set constant, except the ambient temperature [degC]
 WARMED = 3.0
+#: a machine that is said to be cold is compared with one after a run at the top trained speed, and a rest [s]
+HEATED, RESTED = 1800.0, 600.0
 
 _COUNTED: dict[Zero, str] = {
     "start": "the start of the program",
@@ -126,7 +129,8 @@ class Starting:
     carried : Path
         Thermal state at the end of the last job: the file OUT.job.json that thermocomp revise wrote for it.
     pause : str
-        Time since the last job with the spindle stopped, such as "30 min". Default: none.
+        Time since the last job with the spindle stopped, such as "30 min", or with its range "30 min, 20 min to 1 h".
+        Default: none.
     measured : list of str
         Measured drift of the tool point relative to the cold machine, such as z=12um.
     zero : str
@@ -157,8 +161,7 @@ class Starting:
     def start(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> ThermalStart:
         """Return the state of the models at the start of the program."""
         if self.carried is not None:
-            pause = 0.0 if self.pause is None else read_value(self.pause, "time", "--pause", "30 min")
-            return start.carry_over(found, jobstate.read(self.carried).state, pause)
+            return start.carry_over(found, jobstate.read(self.carried).state, self._paused.value)
         if self.measured is not None:
             return start.begin_measured(found, start.deviations(self.measured), others)
         return start.begin_cold(found, others)
@@ -166,6 +169,30 @@ class Starting:
     def drift(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> Drift:
         """Return the drift at the start of the program."""
         return Drift(found, self.start(found, others), others, zero=self._zero)
+
+    def conditions(self, found: Sequence[Station], others: Mapping[str, InputSignal]) -> list[Assumption]:
+        """Return what is assumed about the initial state, and the runs from other states."""
+        runs = []
+        if self.carried is not None:
+            left = jobstate.read(self.carried).state
+            runs = [(text, left, pause) for text, pause in self._paused.ends]
+        speeds = [i.reference + i.high for s in found for i in s.model.inputs if i.quantity == SPEED]
+        if self.cold and speeds:
+            warm = Drift(found, start.begin_cold(found, others), others, zero="cold")
+            warm.advance(HEATED, min(speeds))
+            text = f"{RESTED / 60:g} min after {HEATED / 60:g} min at {min(speeds):g}"
+            runs = [(text, warm.state(), RESTED)]
+        other = [
+            OtherRun(text, drift=Drift(found, start.carry_over(found, left, pause), others, zero=self._zero))
+            for text, left, pause in runs
+        ]
+        return [Assumption("start", self.words(), runs=other)] if other else []
+
+    @property
+    def _paused(self) -> Spread:
+        """Time since the last job [s]."""
+        example = "30 min, 20 min to 1 h"
+        return spread_of(self.pause or "0 s", lambda t: read_value(t, "time", "--pause", "30 min"), "--pause", example)
 
     @property
     def _zero(self) -> Zero:
@@ -175,7 +202,7 @@ class Starting:
         """Return the initial thermal state as text, for the header."""
         if self.carried is not None:
             name = self.carried.name
-            return f"{self.pause} after {name}" if self.pause else f"state of {name}"
+            return f"{self._paused.text} after {name}" if self.pause else f"state of {name}"
         return f"measured {', '.join(self.measured)}" if self.measured else "cold"
 
     def counted(self) -> str:

@@ -1,7 +1,8 @@
 """Values of the options of ``thermocomp revise``, parsed from their texts."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from thermocomp.core.exceptions import InputError, UnitError
 from thermocomp.core.units import read_with_unit as with_unit
@@ -11,6 +12,9 @@ from thermocomp.nc.interpreter.codes import find_code
 from thermocomp.nc.parser.line import Controller
 
 _ANGLE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*(?:deg|°)")
+_PERCENT = re.compile(r"(\d+\.?\d*|\.\d+)\s*%")
+#: assumed value, and the ends of its range
+_SPREAD = re.compile(r"\s*([^,]+?)\s*(?:,\s*(.+?)\s+to\s+(.+?)\s*)?")
 _SYSTEM = re.compile(r"G?5([4-9])(?:\.([1-3]))?(?:\s*P(\d+))?", re.IGNORECASE)
 
 
@@ -25,6 +29,34 @@ def read_value(text: str, quantity: str, option: str, example: str, *, positive:
     if positive and not number > 0:
         raise InputError(f"{option} {text!r}: must be positive")
     return number
+
+
+class Spread(NamedTuple):
+    """Assumed value and the ends of its range, each with its text."""
+
+    text: str
+    value: float
+    ends: tuple[tuple[str, float], ...]  #: empty: the value is certain
+
+
+def spread_of(text: str, read: Callable[[str], float], option: str, example: str) -> Spread:
+    """Return an assumed value and its range."""
+    found = _SPREAD.fullmatch(text)
+    if found is None:
+        raise InputError(f'{option} {text!r}: write a value, or a value and its range, such as "{example}"')
+    taken, *ends = (t for t in found.groups() if t is not None)
+    spread = Spread(taken, read(taken), tuple((t, read(t)) for t in ends))
+    if spread.ends and not spread.ends[0][1] <= spread.value <= spread.ends[1][1]:
+        raise InputError(f"{option} {text!r}: the value must be within its range, and the range from low to high")
+    return spread
+
+
+def percent_of(text: str) -> float:
+    """Return the fraction for a feed override."""
+    found = _PERCENT.fullmatch(text)
+    if found is None or not float(found[1]) > 0:
+        raise InputError(f'--override {text!r}: expected a positive percentage, such as "100 %"')
+    return float(found[1]) / 100.0
 
 
 def origin_of(text: str) -> tuple[int, Point]:

@@ -8,6 +8,8 @@ from thermocomp.nc.interpreter.block import Block
 
 #: path length in a cut over which the correction changes by at most one step [mm]
 SPREAD = 10.0
+#: largest slope with which an approach by feed takes up the correction after machine coordinates [um/mm]
+STEEPEST = 10.0
 #: a tool that is raised by more has left the surface; levels that differ by less are equal [mm]
 CLEAR = 0.5
 
@@ -51,14 +53,29 @@ class Contact:
         spread = self._length / SPREAD
         return self.step * (max(spread, 1.0) if self._way[axis] >= SPREAD else math.floor(spread))
 
+    def takes_up(self, block: Block, gap: float, *, known: bool) -> bool:
+        """Return whether an axis without a correction may take up all of it [um]: the tool is free for long enough.
+
+        Parameters
+        ----------
+        known : bool
+            The position of the axis before the block is known, so that the length of the block is, too.
+        """
+        long = not known or abs(gap) <= STEEPEST * self._length
+        return not self.touching and (long or block.moves[-1].rapid)
+
     def end(self, block: Block, changed: list[bool]) -> None:
         """Record the end of a block, and the axes whose correction changed in it."""
         self._way = [0.0 if c else w + self._length for c, w in zip(changed, self._way, strict=True)]
         if not block.moves:
             return
         rapid = block.moves[-1].rapid
+        machine = block.kind == "machine"
+        if machine and not rapid and "Z" not in block.words and block.modal.plane == 17:
+            return  # fed in machine coordinates: a tool in contact stays there
         if (
-            block.kind in ("machine", "home", "cycle")
+            machine
+            or block.kind in ("home", "cycle")
             or (rapid and (not self.touching or self._lifts(block)))
             or self._above(block)
         ):

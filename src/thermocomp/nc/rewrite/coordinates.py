@@ -174,11 +174,13 @@ class Coordinates(CorrectionMethod):
         self._take(block, frame, old, new)
         if block.modal.absolute:
             self._levels(block, axis, frame, goal[axis], edit)
+        elif block.keeps_levels:
+            self._drilled(block, axis, frame, self._cycle)
         return shift_words(block, shifts, edit.added, frame.digits)
 
     def _refuse_mixed_levels(self, block: Block, axis: int) -> None:
         """Raise `ProgramError` if corrected absolute levels would be reused as distances in G91."""
-        if block.modal.absolute:
+        if block.modal.absolute or block.keeps_levels:
             return
         if any(word not in block.words for word in (AXES[axis], "R")):
             if self._cycle:
@@ -230,6 +232,12 @@ class Coordinates(CorrectionMethod):
             edit.added |= {word: block.sticky[word] + goal for word in words if word not in block.words}
             self._cycle = goal
         edit.shifts |= {word: goal for word in words if word in block.words}
+        self._drilled(block, axis, frame, goal)
+
+    def _drilled(self, block: Block, axis: int, frame: Frame, goal: float) -> None:
+        """Record the corrections in the holes of a cycle, whose levels have a given shift, and after them."""
+        assert self._series is not None
+        carried, plane = self._series[1], block.sticky["R"] / (frame.scale[axis] * 1e3)
         within = list(frame.words(self.carried))
         within[axis] = goal
         self.inner = frame.shift(triple(within))
@@ -317,7 +325,8 @@ class Coordinates(CorrectionMethod):
         out = []
         for i in range(3):
             gap, most = demand[i] - self.carried[i], self.contact.most(block, i)
-            if abs(gap) <= most or self.fixed[i] or self.doubtful[i] or not (self.before[i] or self.contact.touching):
+            free = self.fixed[i] and self.contact.takes_up(block, gap, known=self.before[i])
+            if abs(gap) <= most or free or self.doubtful[i] or not (self.before[i] or self.contact.touching):
                 out.append(demand[i])
             else:
                 # if the least increment is greater than the step, it is the smallest possible change

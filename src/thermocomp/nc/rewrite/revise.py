@@ -6,7 +6,7 @@ whole run (`Revision`) are updated with each line.
 
 import copy
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from operator import add, sub
 from typing import NamedTuple
@@ -19,13 +19,14 @@ from thermocomp.nc.interpreter.interpret import follow_program
 from thermocomp.nc.parser.line import Line
 from thermocomp.nc.parser.recognise import recognised
 from thermocomp.nc.parser.tokens import read_lines
-from thermocomp.nc.planner.timeline import MotionLimits, time_blocks
+from thermocomp.nc.planner.timeline import MotionLimits
 from thermocomp.nc.rewrite import header, known
 from thermocomp.nc.rewrite.check import Check
+from thermocomp.nc.rewrite.conditions import Conditions
 from thermocomp.nc.rewrite.demand import DENSE, OFTEN, CutErrors, Demand, DriftSource, Elsewhere, Left
 from thermocomp.nc.rewrite.method import Change, CorrectionMethod
 from thermocomp.nc.rewrite.offset import ending
-from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split, pieces, shares
+from thermocomp.nc.rewrite.split import Sample, axes_to_split, beside, may_split, pieces, samples_below, shares
 from thermocomp.nc.rewrite.text import Vector
 
 MOST_PIECES = 1000
@@ -65,6 +66,10 @@ class Revision:
         Number of header lines.
     split : bool
         A long cut is split if a single change of the correction would leave more than one step in its middle.
+    conditions : Conditions
+        Assumptions about the run, and other runs that show what they are worth.
+    stock_top : float or None
+        Work coordinate Z above which the tool does not cut [mm]; None: every feed move counts.
 
     Attributes
     ----------
@@ -88,6 +93,8 @@ class Revision:
         By reason why a correction could not follow the drift in a cut: the largest residual [um], and its line.
     standing : int
         First line that cuts while the spindle is stopped; 0 if there is none.
+    ended : bool
+        The program has an end: M2, M30 or a closing ``%``.
     idle : int
         Number of lines with words after the end of the program, which are not corrected.
     """
@@ -99,6 +106,8 @@ class Revision:
     demand: Demand
     header_lines: int = header.LINES
     split: bool = True
+    conditions: Conditions = field(default_factory=Conditions)
+    stock_top: float | None = None
     left: Left = field(default_factory=Left, init=False)
     elsewhere: Elsewhere = field(default_factory=Elsewhere, init=False)
     taken_system: bool = field(default=False, init=False)
@@ -111,6 +120,7 @@ class Revision:
     fastest: float = field(default=0.0, init=False)
     held: dict[str, tuple[float, int]] = field(default_factory=dict, init=False)
     standing: int = field(default=0, init=False)
+    ended: bool = field(default=False, init=False)
     idle: int = field(default=0, init=False)
     _touching: bool = field(default=False, init=False)
     _why: str = field(default="", init=False)  # reason that held the correction in the previous cut
@@ -143,9 +153,10 @@ class Revision:
         steered = known.SpindleState(self.setup)
         point: Point = (0.0, 0.0, 0.0)
         deviation = self.drift.deviation(point)
-        headed = ended = False
+        headed = False
         carried = self.method.carried
-        for block, start, end in time_blocks(follow_program(self._read(texts), self.setup), self.kinematics):
+        blocks = follow_program(self._read(texts), self.setup)
+        for block, start, end in self.conditions.time(blocks, self.kinematics):
             line = block.line
             if not headed and not header.comes_first(line):
                 yield self._header(line.text, deviation, carried)
@@ -154,25 +165,24 @@ class Revision:
             cutting = self._cuts(block)
             speed = steered.speed(block)
             self._note_block(block, start, speed, cutting)
-            samples = self._advance(block, end - self.seconds, speed, point, cutting)
+            samples, message = self._drive(block, end - self.seconds, speed, point, cutting)
+            top = self.stock_top if self.method.before[2] and block.known[2] and not block.turned else None
             self.seconds = end
             if block.moves:
                 point = block.moves[-1].end
             deviation = self.drift.deviation(point)
             demand = self._demanded(line.number, end, point)
             samples.append(Sample(1.0, deviation, demand))
-            change, knots = self._changed(block, samples, check)
+            change, knots = self._changed(block, samples, check, message)
             carried = change.after
             known.refuse_untold_rotation(block, carried)
-            cut = None
-            if cutting:
-                if block.kind == "cycle":
-                    knots = [(0.0, change.inner), (1.0, change.inner)]
-                cut = self._note_cut(block, samples, knots, demand, (end, point))
-            else:
+            if block.kind == "cycle":
+                knots = [(0.0, change.inner), (1.0, change.inner)]
+            cut = self._note_cut(block, samples, knots, demand, (end, point), top) if cutting else None
+            if cut is None:
                 self._why = ""
-            self.idle += ended and bool(line.words)
-            ended |= block.ends
+            self.idle += self.ended and bool(line.words)
+            self.ended |= block.ends
             revised = Revised(
                 number=line.number,
                 text=line.text,
@@ -194,17 +204,21 @@ class Revision:
             yield revised
         if not headed:
             raise ProgramError(max(self.lines, 1), "the program is empty")
-        self._refuse_open(ended, carried)
+        self._refuse_open(carried)
 
     def _note_cut(
         self,
         block: Block,
-        samples: list[Sample],
+        samples: Sequence[Sample],
         knots: list[tuple[float, Vector]],
         demand: Vector,
         end: tuple[float, Point],
-    ) -> CutErrors:
-        """Record what a cut leaves uncorrected, and why; `end` is its time [s] and position."""
+        top: float | None,
+    ) -> CutErrors | None:
+        """Record what a cut below the top of the stock leaves, and why; `end` is its time [s] and position."""
+        self.conditions.take(block, samples, knots, top, end[0], local=self.drift.by_position)
+        if not (samples := samples_below(block, samples, top)):
+            return None
         cut = self.left.take(block.line.number, beside(samples, knots))
         self._note_held(block, demand, samples[0].deviation, (knots[0][1], knots[-1][1]), cut)
         self.taken_system |= not block.modal.system_told
@@ -232,8 +246,10 @@ class Revision:
             inner=carried,
         )
 
-    def _changed(self, block: Block, samples: list[Sample], check: Check) -> tuple[Change, list[tuple[float, Vector]]]:
-        """Return the revised lines of a block, and the corrections along its path."""
+    def _changed(
+        self, block: Block, samples: list[Sample], check: Check, message: tuple[str, ...]
+    ) -> tuple[Change, list[tuple[float, Vector]]]:
+        """Return the revised lines of a block, after a message, and the corrections along its path."""
         method = self.method
         before, begun = method.before, method.carried
         parts = [1.0]
@@ -244,6 +260,7 @@ class Revision:
             parts = [1.0]
         if len(parts) == 1:
             change = method.revise(block, samples[-1].demand or begun)
+            change = change._replace(texts=(*message, *change.texts))
             check.check(block, change)
             return change, [(0.0, begun), (1.0, change.after)]
         demands = {s.share: s.demand for s in samples}
@@ -285,30 +302,46 @@ class Revision:
             return any(not m.rapid for m in block.moves)
         return self._touching
 
-    def _advance(self, block: Block, dt: float, speed: float, point: Point, cutting: bool) -> list[Sample]:
-        """Advance the drift over a block; return the samples of a cut, except that at its end."""
-        if dt > 0 and speed:
-            self.slowest = min(self.slowest, abs(speed))
-            self.fastest = max(self.fastest, abs(speed))
-        if not cutting:
-            if dt > 0:
-                self.drift.advance(dt, speed)
-            return []
+    def _drive(
+        self, block: Block, dt: float, speed: float, point: Point, cutting: bool
+    ) -> tuple[list[Sample], tuple[str, ...]]:
+        """Advance the drift over a block, also that of other runs; return the samples of a cut and a message."""
+        places = self._places(block, dt, point) if cutting else []
+        self.conditions.begin(block, self.drift)
+        shown = self.setup.controller == "linuxcnc"
+        message = self.conditions.message(block, self.drift, dt, speed, point, shown=shown)
+        self.conditions.advance(block, dt, speed, places)
+        return self._advance(block, dt, speed, places), message
+
+    def _places(self, block: Block, dt: float, point: Point) -> list[Point]:
+        """Return the places of the samples of a cut, at equal parts of its path, including both ends."""
         move = block.moves[0] if len(block.moves) == 1 else None
         count = math.ceil(dt / OFTEN)
         if move is not None and self.drift.by_position:
             count = max(count, math.ceil(length(move) / DENSE))
         count = min(max(count, 1), MOST_PIECES)
-        samples = [Sample(0.0, self.drift.deviation(point), None)]
+        inner = [point if move is None else find_point(move, k / count) for k in range(1, count)]
+        return [point, *inner, block.moves[-1].end if block.moves else point]
+
+    def _advance(self, block: Block, dt: float, speed: float, places: Sequence[Point]) -> list[Sample]:
+        """Advance the drift over a block; return the samples of a cut, except that at its end."""
+        if dt > 0 and speed:
+            self.slowest = min(self.slowest, abs(speed))
+            self.fastest = max(self.fastest, abs(speed))
+        if not places:
+            if dt > 0:
+                self.drift.advance(dt, speed)
+            return []
+        count = len(places) - 1
+        samples = [Sample(0.0, self.drift.deviation(places[0]), None)]
         asked = count > 1 and self.split and self.method.splits and may_split(block, self.method.before)
         for k in range(1, count + 1):
             if dt > 0:
                 self.drift.advance(dt / count, speed)
             if k < count:
-                place = point if move is None else find_point(move, k / count)
                 time = self.seconds + dt * k / count
-                demand = self._demanded(block.line.number, time, place) if asked else None
-                samples.append(Sample(k / count, self.drift.deviation(place), demand))
+                demand = self._demanded(block.line.number, time, places[k]) if asked else None
+                samples.append(Sample(k / count, self.drift.deviation(places[k]), demand))
         return samples
 
     def _note_block(self, block: Block, start: float, speed: float, cutting: bool) -> None:
@@ -337,9 +370,9 @@ class Revision:
         if gap > self.held.get(self._why, (0.0, 0))[0]:
             self.held[self._why] = gap, block.line.number
 
-    def _refuse_open(self, ended: bool, carried: Vector) -> None:
+    def _refuse_open(self, carried: Vector) -> None:
         """Raise `ProgramError` if an offset would remain in force after the last line."""
-        if not ended and any(carried) and self.method.leaves_offset:
+        if not self.ended and any(carried) and self.method.leaves_offset:
             raise ProgramError(
                 self.lines,
                 "the program has no end (M2, M30 or %) at which the offset could be cancelled; add M2 or M30",

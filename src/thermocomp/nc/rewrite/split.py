@@ -101,6 +101,28 @@ def beside(samples: Sequence[Sample], knots: Sequence[tuple[float, Vector]]) -> 
         yield sample.deviation, triple(b + part * (a - b) for b, a in zip(before, after, strict=True))
 
 
+def samples_below(block: Block, samples: Sequence[Sample], top: float | None) -> Sequence[Sample]:
+    """Return the samples of a cut that are not above the top of the stock, with one where the tool passes it.
+
+    Parameters
+    ----------
+    top : float or None
+        Work coordinate Z [mm]; None: unknown, as is that of the tool: all samples count.
+    """
+    first, last = block.start[2], block.end[2]
+    if top is None or max(first, last) <= top or len(block.moves) > 1:
+        return samples
+    if min(first, last) > top:
+        return ()
+    share = (top - first) / (last - first)
+    before, after = next(pair for pair in pairwise(samples) if pair[1].share >= share)
+    part = (share - before.share) / (after.share - before.share)
+    there = triple(a + part * (b - a) for a, b in zip(before.deviation, after.deviation, strict=True))
+    sunk = [s for s in samples if (s.share > share) == (last < first) and s.share != share]
+    passing = Sample(share, there, None)
+    return [passing, *sunk] if last < first else [*sunk, passing]
+
+
 def axes_to_split(block: Block, before: Known) -> list[int]:
     """Return the axes whose correction can change within a block: all for a line, the third one for an arc."""
     arc = block.moves[0].arc

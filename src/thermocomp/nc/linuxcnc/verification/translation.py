@@ -21,6 +21,7 @@ DIAMETER: Final = 0.02
 #: LinuxCNC systems used for G54.1 P1 etc.
 _SPARE: Final = (7, 8, 9)
 _MOST_M: Final = 4
+_GO: Final = "G0"
 
 #: identical codes, in LinuxCNC's order of execution
 _SAME: Final = (
@@ -131,6 +132,7 @@ class Translator:
         rotation = self._rotation(block, codes)
         once = next((code for code in _ONCE if code in codes), "")
         before, action, after = ([], self._once(block, once), []) if once else self._move(block, codes)
+        before = [" ".join((*head, text)) if text.startswith(_GO) else text for text in before]
         main = [" ".join(filter(None, (*head, *machine, action)))]
         turned = [*main, *rotation] if block.modal.turned else [*rotation, *main]
         return [text for text in (*first, *before, *turned, *after) if text]
@@ -245,7 +247,9 @@ class Translator:
         """Return a cycle with all its words: LinuxCNC keeps them for the same cycle only, a Fanuc until G80."""
         if not block.moves:  # K0
             return [], "", []
-        state, modal, code = self._follower.state, block.modal, block.modal.motion
+        state, modal = self._follower.state, block.modal
+        # the shift of G76 at the bottom, by Q in a direction that a parameter sets, is the same in both programs
+        code = "G82" if modal.motion == "G76" else modal.motion
         across = PLANES[modal.plane][2]
         letter = "XYZ"[across]
         words = {c: v for c, v in block.values.items() if c in _AXES}
@@ -266,7 +270,25 @@ class Translator:
             # from R a Fanuc moves to the next hole at R; LinuxCNC moves up before or not, depending on rounding
             up = f"G0 {letter}{format_number(level / scale)}"
             return before, f"G99 {code} {_words(words, 'XYZRQPL')}", [up, *after]
+        if block.keeps_levels:
+            return before, "", [*self._holes(block, f"{back}{code}", words), *after]
+        if modal.absolute and modal.retract == 99 and state.level_known and plane - block.start[across] > 1e-6:
+            # a Fanuc moves to the hole first and then up to R, LinuxCNC up first
+            before = [*before, f"{_GO} {_words(block.values, 'XYZ'.replace(letter, ''))}"]
         return before, f"{back}{code} {_words(words, 'XYZRQPL')}", after
+
+    def _holes(self, block: Block, code: str, words: dict[str, float]) -> list[str]:
+        """Return a line for each hole of a cycle in G91 whose levels were stated in G90; LinuxCNC has no such mode."""
+        state = self._follower.state
+        steps = {c: words[c] for c in "XY" if c in words}
+        level, plane = state.level or 0.0, block.sticky["R"] * state.scale
+        if not all(state.known["XY".index(c)] for c in steps) or (state.modal.retract == 98 and plane > level - 1e-3):
+            raise _cannot(block, "G91 in a cycle from a position that is not known, or with R at or above its start")
+        lines = []
+        for k in range(1, int(words.pop("L", 1.0)) + 1):
+            places = {c: block.start["XY".index(c)] / state.scale + k * step for c, step in steps.items()}
+            lines.append(f"G90 {code} {_words(words | places, 'XYZRQP')}")
+        return [*lines, "G91"]
 
     def _spindle(self, block: Block) -> tuple[list[str], list[str]]:
         """Return the lines that start the spindle before a tap and restore it after: a Fanuc does so automatically."""
