@@ -34,7 +34,9 @@ function draw(id, node, series, data, bands, label, points) {
     axes: [{ stroke: css("--soft"), grid: { stroke: css("--line"), width: 1 }, values: times, space: 70 }, axis(label)],
     cursor: { drag: { x: false, y: false } }, legend: { live: false, show: label !== "um" },
   };
-  charts.set(id, { plot: new uPlot(options, data, node), shape, node });
+  const plot = new uPlot(options, data, node), words = series.map(s => s.label).join(", ");
+  for (const [name, value] of Object.entries({ role: "img", "aria-label": `${words} over time` })) plot.ctx.canvas.setAttribute(name, value);
+  charts.set(id, { plot, shape, node });
 }
 
 function add(point) {
