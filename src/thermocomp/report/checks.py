@@ -82,7 +82,10 @@ def panels(recording: Recording, findings: Sequence[Finding], points: int) -> li
                     continue
                 rows = np.array([first]) if f.rows is None or not f.rows.size else f.rows[:: 1 + len(f.rows) // points]
                 at = np.nan_to_num(np.clip(values[rows], *limits), nan=limits[0])
-                dots.append(curves.Curve(f"{number} {f.kind}", hours[rows], at, _TONE[f.severity], shape="dots"))
+                dot = curves.PageCurve(
+                    name=f"{number} {f.kind}", hours=hours[rows], values=at, tone=_TONE[f.severity], shape="dots"
+                )
+                dots.append(dot)
         made.append(curves.channels(recording, shown, points, dots, limits))
     return made
 

@@ -18,7 +18,7 @@ SHARE, RUN = 25_000, 2400
 _LOW = {"spindle_speed": 120, "position": 150, "feed": 120}
 
 
-class Curve(NamedTuple):
+class PageCurve(NamedTuple):
     """A curve, or the places of a finding.
 
     Parameters
@@ -48,14 +48,14 @@ def channels(
     recording: Recording,
     shown: Sequence[Channel],
     points: int,
-    more: Sequence[Curve] = (),
+    more: Sequence[PageCurve] = (),
     limits: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """Return the panel of channels of one quantity, each of which can be hidden.
 
     Parameters
     ----------
-    more : sequence of Curve
+    more : sequence of PageCurve
         Drawn above the channels, with all their points.
     limits : tuple of float, optional
         Values beyond are not drawn unless there are no others. Default: the range of the channels.
@@ -65,7 +65,8 @@ def channels(
     curves = []
     for k, c in enumerate(shown):
         x, y = thin_points(hours, recording.table[c.name].to_numpy(dtype=np.float64), points)
-        curves.append(Curve(c.name, x, y, f"--c{k % len(COLOURS)}", k // len(COLOURS), shape))
+        tone, dash = f"--c{k % len(COLOURS)}", k // len(COLOURS)
+        curves.append(PageCurve(name=c.name, hours=x, values=y, tone=tone, dash=dash, shape=shape))
     cycles = [(float(hours[c.start]), float(hours[c.stop - 1]), c.name, "") for c in recording.cycles]
     title = f"{quantity.replace('_', ' ')} [{shown[0].unit}]"
     return _panel(title, [*curves, *more], cycles, limits, _LOW.get(quantity, 260))
@@ -81,14 +82,14 @@ def run(shown: Assessment, recordings: Sequence[Recording]) -> list[dict[str, An
     """Return the panel of a model over its judged rows: measured, predicted, residual; thermal cycles shaded."""
     hours = clock(shown, [r.time for r in recordings])
     curves = [
-        Curve("measured = without compensation", hours, shown.measured, "--ink"),
-        Curve("predicted", hours, shown.predicted, "--c0", 1),
-        Curve("residual = with compensation", hours, shown.measured - shown.predicted, "--c1"),
+        ("measured = without compensation", shown.measured, "--ink"),
+        ("predicted", shown.predicted, "--c0"),
+        ("residual = with compensation", shown.measured - shown.predicted, "--c1"),
     ]
     if shown.band and shown.half_widths is not None:
         alone = shown.predicted if shown.alone is None else shown.alone
         edges = (("lower", -1), ("upper", 1))
-        curves += [Curve(f"band, {edge}", hours, alone + sign * shown.half_widths, "--c5") for edge, sign in edges]
+        curves += [(f"band, {edge}", alone + sign * shown.half_widths, "--c5") for edge, sign in edges]
     names = [c.name for r in recordings for c in r.cycles]
     units = {u.name: u for u in shown.verdict.units}
     cycles = []
@@ -98,15 +99,16 @@ def run(shown: Assessment, recordings: Sequence[Recording]) -> list[dict[str, An
         u = units.get(name)
         told = f"RMS {u.rms:.2f} instead of {u.none_rms:.2f} um{', HARMFUL' if u.harmful else ''}" if u else ""
         cycles.append((float(hours[first]), float(hours[last]), name, told))
-    thinned = [
-        c._replace(**dict(zip(("hours", "values"), thin_points(hours, c.values, RUN), strict=True))) for c in curves
-    ]
+    thinned = []
+    for name, values, tone in curves:
+        x, y = thin_points(hours, values, RUN)
+        thinned.append(PageCurve(name=name, hours=x, values=y, tone=tone, dash=int(name == "predicted")))
     return [_panel(f"{shown.target.removesuffix('_um')} [um]", thinned, cycles)]
 
 
 def _panel(
     title: str,
-    curves: Sequence[Curve],
+    curves: Sequence[PageCurve],
     cycles: Sequence[tuple[float, float, str, str]],
     limits: tuple[float, float] | None = None,
     height: int = 260,
