@@ -54,7 +54,7 @@ function options(panel, key, last, zoomed) {
   const line = () => css("--line"), soft = () => css("--soft"), axis = { stroke: soft, grid: { stroke: line, width: 1 }, ticks: { stroke: line } };
   const cycle = t => (panel.cycles.find(([from, to]) => from <= t && t <= to) || []).slice(2).filter(Boolean).join(": ");
   const series = panel.curves.map(c => ({
-    label: c.name, stroke: () => css(c.tone), width: 1.5, dash: DASHES[c.dash % 4],
+    label: c.name, stroke: () => css(c.tone), width: c.name.startsWith("band, ") ? 0 : 1.5, dash: DASHES[c.dash % 4],
     paths: c.shape === "dots" ? () => null : c.shape ? uPlot.paths.stepped({ align: 1 }) : undefined,
     points: c.shape === "dots" ? { show: true, size: 8, fill: () => css(c.tone) } : { show: false },
     value: (_, v) => v == null ? "–" : v.toFixed(panel.digits),
