@@ -8,6 +8,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from browsing import RUN_AXE, axe
 from fastapi import FastAPI
 from test_loop import Given, machine
 from watchedmachine import failing, watched_model
@@ -306,6 +307,12 @@ def test_in_a_browser(tmp_path: Path) -> None:
             await feed(range(265, 270))
             await playwright.expect(card.locator(".word")).to_have_text("active", timeout=5_000)
             assert wrong == []
+            await shown.evaluate(axe())
+            for width, scheme in ((1180, "light"), (1180, "dark"), (400, "dark")):
+                await shown.set_viewport_size({"width": width, "height": 820})
+                await shown.emulate_media(color_scheme=scheme)
+                assert await shown.evaluate(RUN_AXE) == [], (width, scheme)
+                assert await shown.evaluate("document.documentElement.scrollWidth") <= width
             await browser.close()
         for task in tasks:
             task.cancel()

@@ -116,7 +116,7 @@ def comparison(samples: Samples) -> Comparison:
 
 
 def test_a_name_lies_above_the_bar(comparison: Comparison) -> None:
-    (ax,) = figures.robustness(comparison, "ols").figure.axes
+    (ax,) = figures.robustness(comparison.overall()).figure.axes
     (name,) = ax.texts[:1]
     patch = name.get_bbox_patch()
     assert patch is not None

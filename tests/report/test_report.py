@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browsing import chromium
+from ownscripts import without_scripts
 from rich.console import Console
 from smallmachine import small_machine
 
@@ -129,8 +131,8 @@ def test_harm_within_the_margin_is_a_caution(comparison: Comparison) -> None:
 
 
 def test_the_page_needs_no_network(page: str) -> None:
+    assert "<script" not in without_scripts(page)
     assert not re.findall(r"""(?:src|href)=["'](?!#)[^"']+["']""", page.replace("xlink:href", "href"))
-    assert "<script" not in page
     assert "url(http" not in page
     assert "@import" not in page
 
@@ -200,17 +202,12 @@ def test_a_name_with_a_formula_in_it_is_drawn(recording: Recording) -> None:
 
 def test_on_a_phone_in_the_dark_and_on_paper(page: str, tmp_path: Path) -> None:
     """400 px without sideways scrolling, dark by wish, few sheets of A4, and a text in place of every figure."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    browser = shutil.which("chromium")
-    if browser is None:
-        pytest.skip("chromium is not installed: apt-get install chromium (make test does)")
     source = tmp_path / "report.html"
     source.write_text(page, encoding="utf-8")
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
+    with chromium() as browser:
         grounds = {}
         for scheme in ("light", "dark"):
-            shown = chromium.new_page(viewport={"width": 400, "height": 900}, color_scheme=scheme)
+            shown = browser.new_page(viewport={"width": 400, "height": 900}, color_scheme=scheme)
             shown.goto(source.as_uri())
             assert shown.evaluate("document.documentElement.scrollWidth") <= 400
             grounds[scheme] = shown.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -220,5 +217,4 @@ def test_on_a_phone_in_the_dark_and_on_paper(page: str, tmp_path: Path) -> None:
         assert all((f.get_attribute("aria-label") or "").strip() for f in figures)
         assert shown.locator("td").evaluate_all("cells => Math.max(...cells.map(c => c.textContent.length))") < 100
         sheets = len(re.findall(rb"/Type\s*/Page[^s]", shown.pdf(prefer_css_page_size=True)))
-        chromium.close()
     assert sheets <= 6

@@ -13,8 +13,8 @@ from thermocomp.judging.diagnostics import Collinearity
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.recording import Recording
-from thermocomp.report import faults, figures, probings
-from thermocomp.report.html import draw_runs, page
+from thermocomp.report import faults, probings
+from thermocomp.report.html import draw_measured, draw_runs, page
 from thermocomp.report.layout import laid_out
 from thermocomp.report.sections import Section
 from thermocomp.report.summary import summarise
@@ -36,7 +36,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
             "predictions": draw_runs(seen, recordings),
             "cautions": [*_fitted_badly(judged), *content["cautions"], *(c for s in sections for c in s.cautions)],
             "sections": sections,
-            "measured": [figures.measured(r) for r in recordings],
+            "measured": draw_measured(recordings),
         },
     )
 

@@ -11,7 +11,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
-from thermocomp.report import records
+from thermocomp.report import curves, records
 from thermocomp.report.drawing import BESIDE, add_legend, drawing, svg
 from thermocomp.report.figures import POINTS, line_style, shade_cycles, thin_points
 from thermocomp.report.html import page
@@ -20,34 +20,36 @@ from thermocomp.report.layout import Column, Layout
 #: panels by quantity from top to bottom, with their relative heights
 _PANELS = {"spindle_speed": 1.0, "temperature": 2.4, "displacement": 2.4, "angle": 2.0, "position": 1.2, "feed": 1.0}
 _MARK = {"trouble": "#b00020", "warning": "#E69F00", "info": "#5b636e"}
+_TONE = {"trouble": "--bad", "warning": "--c4", "info": "--soft"}
 #: maximum number of names next to a panel
 _NAMED = 14
+#: findings of each channel, with their position in the list
+_Numbers = Mapping[str, Sequence[tuple[int, Finding]]]
 
 
 def render(recordings: Sequence[Recording], findings: Sequence[Sequence[Finding]]) -> str:
     """Return the page about the findings as self-contained HTML."""
+    points = curves.share_points(recordings)
     return page(
         "check.html",
-        recordings=[_recording(r, found) for r, found in zip(recordings, findings, strict=True)],
+        recordings=[_recording(r, found, points) for r, found in zip(recordings, findings, strict=True)],
         remedy=records.remedy,
     )
 
 
-def draw(recording: Recording, findings: Sequence[Finding]) -> str:
+def draw(recording: Recording, findings: Sequence[Finding], points: int = POINTS) -> str:
     """Return the figure of a recording as SVG; empty if there is nothing to draw."""
-    drawn = figure(recording, findings)
+    drawn = figure(recording, findings, points)
     if not drawn.axes:
         return ""
     with drawing(recording.name):
         return svg(drawn)
 
 
-def figure(recording: Recording, findings: Sequence[Finding]) -> Figure:
+def figure(recording: Recording, findings: Sequence[Finding], points: int = POINTS) -> Figure:
     """Plot each channel with its findings marked; the number of a finding is its position in the list."""
     shown = {q: recording.of_quantity(q) for q in _PANELS if recording.of_quantity(q)}
-    numbers: dict[str, list[tuple[int, Finding]]] = {}
-    for number, f in enumerate(findings, start=1):
-        numbers.setdefault(f.channel, []).append((number, f))
+    numbers = _numbers(findings)
     heights = [_PANELS[q] for q in shown]
     with drawing(recording.name):
         made = Figure(figsize=(9.6, 0.8 + 1.15 * sum(heights)), layout="constrained")
@@ -55,10 +57,37 @@ def figure(recording: Recording, findings: Sequence[Finding]) -> Figure:
             return made
         panels = made.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
         for ax, (quantity, channels) in zip(panels, shown.items(), strict=True):
-            _panel(ax, recording, quantity, channels, numbers)
+            _panel(ax, recording, quantity, channels, numbers, points)
         panels[-1].set_xlabel("time [h]")
         panels[-1].margins(x=0)
         return made
+
+
+def _numbers(findings: Sequence[Finding]) -> _Numbers:
+    found: dict[str, list[tuple[int, Finding]]] = {}
+    for number, f in enumerate(findings, start=1):
+        found.setdefault(f.channel, []).append((number, f))
+    return found
+
+
+def panels(recording: Recording, findings: Sequence[Finding], points: int) -> list[dict[str, Any]]:
+    """Return the same as `figure` with hover and zoom: all channels, and the rows of each finding as dots."""
+    hours, numbers, made = recording.time / 3600, _numbers(findings), []
+    for shown in filter(None, map(recording.of_quantity, _PANELS)):
+        limits, dots = _limits(recording, shown, numbers), []
+        for name in ("", *(c.name for c in shown)):
+            values = recording.table[name].to_numpy(dtype=np.float64) if name else np.full(len(hours), limits[0])
+            for number, f in numbers.get(name, ()):
+                if (first := _first(f)) is None:
+                    continue
+                rows = np.array([first]) if f.rows is None or not f.rows.size else f.rows[:: 1 + len(f.rows) // points]
+                at = np.nan_to_num(np.clip(values[rows], *limits), nan=limits[0])
+                dot = curves.PageCurve(
+                    name=f"{number} {f.kind}", hours=hours[rows], values=at, tone=_TONE[f.severity], shape="dots"
+                )
+                dots.append(dot)
+        made.append(curves.channels(recording, shown, points, dots, limits))
+    return made
 
 
 def _panel(
@@ -66,7 +95,8 @@ def _panel(
     recording: Recording,
     quantity: str,
     channels: Sequence[Channel],
-    numbers: Mapping[str, Sequence[tuple[int, Finding]]],
+    numbers: _Numbers,
+    points: int,
 ) -> None:
     """Draw the channels of one quantity with their findings."""
     hours = recording.time / 3600
@@ -81,7 +111,7 @@ def _panel(
     labels: dict[float, list[tuple[int, Finding]]] = {}
     for k, c in enumerate(ordered):
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
-        ax.plot(*thin_points(hours, values), **line_style(k), lw=1.0, zorder=3, label=names[k])
+        ax.plot(*thin_points(hours, values, points), **line_style(k), lw=1.0, zorder=3, label=names[k])
         for number, f in numbers.get(c.name, ()):
             _mark(ax, hours, np.clip(values, low, high), f, "--")
             if (row := _first(f)) is not None:
@@ -97,9 +127,7 @@ def _panel(
     add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
 
 
-def _limits(
-    recording: Recording, channels: Sequence[Channel], numbers: Mapping[str, Sequence[tuple[int, Finding]]]
-) -> tuple[float, float]:
+def _limits(recording: Recording, channels: Sequence[Channel], numbers: _Numbers) -> tuple[float, float]:
     """Return the range of plausible values with a margin: one large spike would hide all other values."""
     low, high = np.inf, -np.inf
     for c in channels:
@@ -146,7 +174,7 @@ def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
     )
 
 
-def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
+def _recording(r: Recording, found: Sequence[Finding], points: int) -> dict[str, Any]:
     kinds: dict[str, list[str]] = {}
     for number, f in enumerate(found, start=1):
         kinds.setdefault(f.channel, []).append(f"{number} {f.kind}")
@@ -169,5 +197,6 @@ def _recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
         ),
         "counts": {s: sum(f.severity == s for f in found) for s in ("trouble", "warning", "info")},
         "notes": [n for n in r.notes if n not in {f.text for f in found}],
-        "figure": draw(r, found),
+        "figure": draw(r, found, points),
+        "curves": panels(r, found, points),
     }

@@ -27,7 +27,7 @@ LETTERS = 95
 POINTS = 1200  # per curve across the page: sufficient resolution at a small file size
 
 
-def measured(recording: Recording) -> Drawn:
+def measured(recording: Recording, points: int = POINTS) -> Drawn:
     """Plot the measurements of one test: speed, temperatures, displacements; thermal cycles shaded."""
     hours = recording.time / 3600
     speed = recording.speed
@@ -40,7 +40,8 @@ def measured(recording: Recording) -> Drawn:
         rest = list(axes)
         if speed is not None:
             ax = rest.pop(0)
-            ax.plot(*thin_points(hours, recording.table[speed.name].to_numpy()), color=MEASURED, drawstyle="steps-post")
+            values = recording.table[speed.name].to_numpy()
+            ax.plot(*thin_points(hours, values, points), color=MEASURED, drawstyle="steps-post")
             ax.set_ylabel("1/min")
             ax.set_title("spindle speed", pad=14)
             room = float(hours[-1] - hours[0]) / LETTERS
@@ -55,7 +56,8 @@ def measured(recording: Recording) -> Drawn:
             (rest[1], recording.displacements, "um", "displacements: error of an uncompensated part"),
         ):
             for k, c in enumerate(channels):
-                ax.plot(*thin_points(hours, recording.table[c.name].to_numpy()), **line_style(k), label=c.name)
+                values = recording.table[c.name].to_numpy()
+                ax.plot(*thin_points(hours, values, points), **line_style(k), label=c.name)
             ax.set_ylabel(unit)
             ax.set_title(title)
             if channels:
@@ -106,11 +108,11 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
     columns = min(len(blocks), 3)
     rows = -(-len(blocks) // columns)
     with drawing(assessment.target + assessment.model):
-        figure = Figure(figsize=(9.6, 0.5 + 2.6 * rows), layout="constrained")
+        figure = Figure(figsize=(9.6, 0.5 + 2.0 * rows), layout="constrained")
         axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
         for ax in axes.flat[len(blocks) :]:
             ax.set_visible(False)
-        points = POINTS // columns
+        points = max(60, min(POINTS // columns, 2 * POINTS // len(blocks)))
         for ax, block in zip(axes.flat, blocks, strict=False):
             hours = clock(block, time)
             ax.axhline(0, color="#aaa", lw=0.8)
@@ -124,7 +126,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
             )
             ax.plot(*thin_points(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
             ax.plot(
-                *thin_points(hours, block.measured - block.predicted),
+                *thin_points(hours, block.measured - block.predicted, points),
                 color=RESIDUAL,
                 label="residual = with compensation",
             )
@@ -152,10 +154,9 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
     ax.fill_between(hours[rows], low, high, color=BAND, lw=0, zorder=0.5, label=block.band)
 
 
-def robustness(comparison: Comparison, model: str) -> Drawn:
+def robustness(found: Sequence[Assessment]) -> Drawn:
     """Plot the RMS undisturbed, with noise, with each sensor lost, and with each off without being detected."""
-    found = [a for a in comparison.overall() if a.model == model and a.robustness is not None]
-    with drawing("robustness" + model):
+    with drawing("robustness"):
         figure = Figure(figsize=(9.6, 0.6 + 0.42 * len(found)), layout="constrained")
         ax = figure.subplots()
         for k, a in enumerate(found):
@@ -180,7 +181,7 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
                     color=RESIDUAL,
                     bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 0.8},
                 )
-        noise = found[0].robustness.noise if found and found[0].robustness else 0.0
+        noise = found[0].robustness.noise if found[0].robustness else 0.0
         ax.plot([], [], "o", color=PREDICTED, label="undisturbed")
         ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
         ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
@@ -188,9 +189,9 @@ def robustness(comparison: Comparison, model: str) -> Drawn:
         ax.plot([], [], "x", color=COLOURS[3], ms=4, label="one sensor off, undetected")
         ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
         log_ticks(ax, "x")
-        name_ticks(ax.yaxis, [a.target for a in found])
+        name_ticks(ax.yaxis, [f"{a.target}: {a.model}" for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
-        ax.set_xlabel(f"{model}: RMS of the residual on the judged rows [um]")
+        ax.set_xlabel("RMS of the residual on the judged rows [um]")
         add_legend(ax, **BESIDE)
         return svg(figure)
 
@@ -220,12 +221,18 @@ def shade_cycles(ax: Axes, recording: Recording) -> None:
 
 
 def thin_points(x: FloatArray, y: FloatArray, points: int = POINTS) -> tuple[FloatArray, FloatArray]:
-    """Return at most about `points` points, including the extremes of each interval."""
-    stretch = len(x) // (points // 2)
-    if stretch < 2 or not np.isfinite(y).all():
+    """Return at most about `points` points, including the extremes of each interval and the ends of gaps."""
+    stretch = -(-len(x) // (points // 2))
+    if stretch < 3:
         return x, y
-    n = len(x) // stretch * stretch
-    parts = y[:n].reshape(-1, stretch)
-    first = np.arange(0, n, stretch)
-    picked = np.unique(np.concatenate([first + parts.argmin(axis=1), first + parts.argmax(axis=1), [0, len(x) - 1]]))
-    return x[picked], y[picked]
+    known = np.isfinite(y)
+    ends = np.flatnonzero(np.diff(known))
+    if 4 * len(ends) > points:  # values at every few rows only: no gaps
+        return thin_points(x[known], y[known], points)
+    rows = np.arange(-(-len(x) // stretch) * stretch).reshape(-1, stretch).clip(max=len(x) - 1)
+    picked = [
+        np.take_along_axis(rows, f(np.where(known, y, worst)[rows], axis=1)[:, None], axis=1).ravel()
+        for f, worst in ((np.argmin, np.inf), (np.argmax, -np.inf))
+    ]
+    chosen = np.unique(np.concatenate([*picked, ends, ends + 1, [0, len(x) - 1]]))
+    return x[chosen], y[chosen]

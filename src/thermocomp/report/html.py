@@ -1,9 +1,11 @@
 """Reports as offline HTML files: numbers are collected in a dict and rendered by a template."""
 
 from collections.abc import Sequence
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
 from thermocomp import __version__
@@ -13,7 +15,7 @@ from thermocomp.judging.choice import Choice
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.report import contributions, figures, selections
+from thermocomp.report import contributions, curves, figures, selections
 from thermocomp.report.bands import describe_coverage
 from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um, laid_out
@@ -24,7 +26,7 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
     """Return the report as a self-contained HTML page."""
     overall = comparison.overall()
     drawn = draw_runs(comparison, recordings)
-    stressed = dict.fromkeys(model for model, *_ in drawn.values())
+    stressed = [a for a in overall if a.robustness is not None and a.model == drawn.get(a.target, [""])[0]]
     content = summarise(comparison, recordings, samples)
     models = {t["name"]: t["formula"]["model"] for t in content["targets"] if t["formula"]}
     return page(
@@ -35,19 +37,21 @@ def render(comparison: Comparison, recordings: Sequence[Recording], samples: Sam
             for target, model in models.items()
             if samples is not None and isinstance(model, PacedDynamic)
         },
-        measured=[figures.measured(r) for r in recordings],
+        measured=draw_measured(recordings),
         overview=figures.overview(comparison),
         predictions=drawn,
-        robustness={
-            m: figures.robustness(comparison, m)
-            for m in stressed
-            if any(a.model == m and a.robustness is not None for a in overall)
-        },
+        robustness=figures.robustness(stressed) if stressed else "",
     )
 
 
-def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str]]:
-    """Return figures of the best model of each target; if none may be used, of the least bad one, marked as refused."""
+def draw_measured(recordings: Sequence[Recording]) -> list[tuple[Drawn, list[Any]]]:
+    """Return the figure of each recording, and its curves."""
+    points = curves.share_points(recordings)
+    return [(figures.measured(r, points), curves.measured(r, points)) for r in recordings]
+
+
+def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[str, tuple[str, Drawn, str, list[Any]]]:
+    """Return the best model of each target, or the least bad one, marked as refused: name, figure, coverage, curves."""
     times = [r.time for r in recordings]
     overall = comparison.overall()
     drawn = {}
@@ -60,7 +64,8 @@ def draw_runs(comparison: Comparison, recordings: Sequence[Recording]) -> dict[s
             blocks = [
                 a for a in comparison.assessments if (a.target, a.model) == (target, shown.model) and not a.overall
             ]
-            drawn[target] = (shown.model, figures.prediction(shown, blocks or [shown], times), _held(shown))
+            figure = figures.prediction(shown, blocks or [shown], times)
+            drawn[target] = (shown.model, figure, _held(shown), curves.run(shown, recordings))
     return drawn
 
 
@@ -89,6 +94,12 @@ def _shown(value: Any) -> Any:
     return replace_unprintable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
+def _embed(panels: Sequence[dict[str, Any]]) -> Markup:
+    """Return panels as JSON content for ``static/curves.js``; nothing without panels."""
+    content = htmlsafe_json_dumps(panels, separators=(",", ":"))
+    return Markup('<script type="application/json">{}</script>').format(content) if panels else Markup()
+
+
 def environment() -> Environment:
     """Return the template environment of the pages with its filters."""
     pages = Environment(
@@ -102,4 +113,6 @@ def environment() -> Environment:
     pages.filters["um"] = in_um
     pages.filters["hours"] = lambda value: f"{value:.1f}"
     pages.filters["laid_out"] = laid_out
+    pages.filters["live"] = _embed
+    pages.globals["static"] = lambda name: Markup((files(__package__) / "static" / name).read_text(encoding="utf-8"))
     return pages

@@ -28,7 +28,7 @@ def make_app(
     """
     app = FastAPI(title="thermocomp", docs_url=None, redoc_url=None, default_response_class=Json)
     app.add_middleware(Door, names=hosts)
-    app.mount("/static", StaticFiles(directory=_STATIC))
+    app.mount("/static", StaticFiles(directory=_STATIC, packages=[("thermocomp.report", "static")]))  # uPlot is there
 
     @app.exception_handler(AnyHTTPException)
     async def refuse(_: Request, error: AnyHTTPException) -> Json:

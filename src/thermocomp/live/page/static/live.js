@@ -4,7 +4,7 @@ const at = (root, selector) => root.querySelector(selector);
 const put = (node, text) => { if (node && node.textContent !== text) node.textContent = text; };
 const um = x => x === null || x === undefined ? "–" : (x >= 0 ? "+" : "−") + Math.abs(x).toFixed(1) + " um";
 const clock = t => new Date(t * 1000).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hourCycle: "h23" });
-const TINTS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999"];
+const tint = k => css("--c" + k % 7);
 const MOST = 720;
 let curves = { time: [] }, charts = new Map(), heard = 0;
 
@@ -34,7 +34,9 @@ function draw(id, node, series, data, bands, label, points) {
     axes: [{ stroke: css("--soft"), grid: { stroke: css("--line"), width: 1 }, values: times, space: 70 }, axis(label)],
     cursor: { drag: { x: false, y: false } }, legend: { live: false, show: label !== "um" },
   };
-  charts.set(id, { plot: new uPlot(options, data, node), shape, node });
+  const plot = new uPlot(options, data, node), words = series.map(s => s.label).join(", ");
+  for (const [name, value] of Object.entries({ role: "img", "aria-label": `${words} over time` })) plot.ctx.canvas.setAttribute(name, value);
+  charts.set(id, { plot, shape, node });
 }
 
 function add(point) {
@@ -62,7 +64,7 @@ function drawAll(state) {
   }
   const heat = Object.keys(curves).filter(n => n !== "time" && !/ (predicted|\+-|correction)$/.test(n));
   if (heat.length) draw("heat", at(document, "#heat"), heat.map((label, k) => (
-    { label, stroke: TINTS[k % TINTS.length], width: 1.5, dash: k < TINTS.length ? [] : [6, 4], points: { show: false } })),
+    { label, stroke: tint(k), width: 1.5, dash: k < 7 ? [] : [6, 4], points: { show: false } })),
     [time, ...heat.map(n => curves[n])], [], "degC");
   drawResiduals(state);
 }
@@ -74,7 +76,7 @@ function drawResiduals(state) {
   put(at(document, "#unprobed"), `${found.length} in all; the last, of ${last.target}: ${um(last.residual)}, action limit ${last.limit.toFixed(1)} um` +
     (beyond ? ": look for the cause" : "") + (last.refused ? "; refused: " + last.refused : ""));
   const names = [...new Set(found.map(r => r.target))], time = found.map(r => r.time);
-  const series = names.map((label, k) => ({ label, stroke: TINTS[k % TINTS.length], width: 0, paths: () => null, points: { show: true, size: 9, fill: TINTS[k % TINTS.length] } }));
+  const series = names.map((label, k) => ({ label, stroke: tint(k), width: 0, paths: () => null, points: { show: true, size: 9, fill: tint(k) } }));
   const limit = label => ({ label, stroke: css("--bad"), dash: [5, 5], points: { show: false } });
   draw("residuals", at(document, "#residuals"), [...series, limit("action limit"), limit("action limit, lower")],
     [time, ...names.map(n => found.map(r => r.target === n && r.limit ? r.residual / r.limit : null)), found.map(() => 1), found.map(() => -1)], [], "residual / action limit", true);

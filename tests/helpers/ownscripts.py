@@ -1,0 +1,13 @@
+"""The scripts of a page that draw its curves; nothing else on a page may be a script."""
+
+import re
+from importlib.resources import files
+
+STATIC = files("thermocomp.report") / "static"
+
+
+def without_scripts(page: str) -> str:
+    """Return a page without the curves' scripts as they are in the package, and without their data."""
+    for name in ("uplot.min.js", "uplot.LICENSE", "curves.js"):
+        page = page.replace((STATIC / name).read_text(encoding="utf-8").rstrip("\n"), "")
+    return re.sub(r"<script>\s*(/\*\s*\*/)?\s*</script>|<script type=\"application/json\">[^<>&]*</script>", "", page)
