@@ -67,7 +67,7 @@ $(VENV)/.study: pyproject.toml
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live,onnx]' --group dev
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live,onnx,files]' --group dev
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml
