@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,9 @@ from thermocomp.core.exceptions import InputError, RecordingError, tell_nearest
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.frames import parts_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 
@@ -154,6 +158,22 @@ class Recording:
         table = self.table.reset_index(drop=True)
         table.insert(0, "time_s", self.time)
         return table
+
+    def plot(self) -> "Figure":
+        """Return a figure of the channels over time [h], a panel per quantity."""
+        from matplotlib.figure import Figure
+
+        quantities = list(dict.fromkeys((c.quantity, c.unit) for c in self.channels))
+        figure = Figure(figsize=(9.6, 0.8 + 2.2 * len(quantities)), layout="constrained")
+        panels = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0] if quantities else ()
+        for ax, (quantity, unit) in zip(panels, quantities, strict=True):
+            for c in self.of_quantity(quantity):
+                ax.plot(self.time / 3600, self.table[c.name], lw=1.0, label=c.name)
+            ax.set_ylabel(f"{quantity.replace('_', ' ')} [{unit}]")
+            ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
+        if quantities:
+            panels[-1].set_xlabel("time [h]")
+        return figure
 
     def __len__(self) -> int:
         return len(self.time)

@@ -114,8 +114,8 @@ def zeros(recording: Recording, signals: Sequence[Signal]) -> Iterator[Finding]:
     if turns(recording, zeroing):
         told = f", where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved" * bool(moved)
         text = (
-            f"turns in the first row{told}: unless it was started at that moment, the zero was not taken at rest; record "
-            "from the standstill on, or state what went before with --start"
+            f"turns in the first row{told}: unless it was started at that moment, the zero was not taken at rest; "
+            "record from the standstill on, or state what went before with --start"
         )
         severity: Severity = "warning" if moved else "info"
         yield Finding(severity, zeroing.speed, "turning start", text, row=0)
