@@ -165,14 +165,13 @@ class Recording:
 
         quantities = list(dict.fromkeys((c.quantity, c.unit) for c in self.channels))
         figure = Figure(figsize=(9.6, 0.8 + 2.2 * len(quantities)), layout="constrained")
-        panels = figure.subplots(len(quantities), 1, sharex=True, squeeze=False)[:, 0] if quantities else ()
-        for ax, (quantity, unit) in zip(panels, quantities, strict=True):
+        for k, (quantity, unit) in enumerate(quantities, start=1):
+            ax = figure.add_subplot(len(quantities), 1, k)
             for c in self.of_quantity(quantity):
                 ax.plot(self.time / 3600, self.table[c.name], lw=1.0, label=c.name)
-            ax.set_ylabel(f"{quantity.replace('_', ' ')} [{unit}]")
+            ax.set(ylabel=f"{quantity.replace('_', ' ')} [{unit}]", xlabel="time [h]")
+            ax.label_outer()
             ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
-        if quantities:
-            panels[-1].set_xlabel("time [h]")
         return figure
 
     def __len__(self) -> int:

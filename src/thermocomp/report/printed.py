@@ -187,17 +187,14 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
             held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
             sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))
-            name = f"{a.model}, in-sample" if a.caveat else a.model
-            rows.append((name, *figures, less, *held, sensors, verdict(a.word)))
+            rows.append((a.model, *figures, less, *held, sensors, verdict(a.word)))
     band = (("held", ">"), ("+-", ".2f")) if banded else ()
     headings = (*((h, ".2f") for h in metrics), ("less", ">"), *band, ("sensors", ">"), ("verdict", ""))
     columns = (Column("", 0), *(Column(h, k, form, whole=True) for k, (h, form) in enumerate(headings, start=1)))
     return Layout(
         columns,
         rows,
-        caption="residual in um on the judged rows; less: reduction of the RMS"
-        + ("; in-sample: on the rows used for training" if any(a.caveat for a in assessments) else "")
-        + _band_words(assessments),
+        caption="residual in um on the judged rows; less: reduction of the RMS" + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),
     )

@@ -111,7 +111,7 @@ def zeros(recording: Recording, signals: Sequence[Signal]) -> Iterator[Finding]:
     """
     zeroing = find_zeroing(recording)
     moved = [s.channel.name for s in signals if abs(level(recording, s.channel.name, zeroing)) > NEAR]
-    if turns(recording, zeroing):
+    if signals and turns(recording, zeroing):
         told = f", where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved" * bool(moved)
         text = (
             f"turns in the first row{told}: unless it was started at that moment, the zero was not taken at rest; "
