@@ -71,12 +71,12 @@ def print_answer(
         written = fold(written[0], 2, console.width)
     following = _command(answer.following, console.width) if answer.following else []
     warned = [PrintedLine(text, Toned("but ", "doubtful")) for text in answer.warnings[:1]]
-    more = count_others(max(len(answer.warnings) - 1, 0)) if count else ""
+    uncounted = count_others(max(len(answer.warnings) - 1, 0)) if count else ""
     left = room - len(written) - hint - len(following)
     for head, each in ((3, 2), (2, 2), (2, 1), (1, 1)):
         first = _folded(PrintedLine(answer.head), head, console) if answer.head else []
         others = [text for line in answer.lines for text in _folded(line, each, console)]
-        others += [text for line in warned for text in _folded(line, each, console, more)]
+        others += [text for line in warned for text in _folded(line, each, console, uncounted)]
         if len(first) + len(others) <= left:
             break
     _print(first, console)
