@@ -49,7 +49,7 @@ def test_many_cycles_are_summarised(tmp_path: Path, capsys: pytest.CaptureFixtur
     table.to_csv(tmp_path / "month.csv", index=False)
     run(["check", str(tmp_path / "month.csv"), "--details"])
     text = " ".join(capsys.readouterr().out.split())
-    assert "31 thermal cycles (30 with fewer than 20 rows): " in text
+    assert "31 thermal cycles (30 of them short): " in text
     assert (
         "31 thermal cycles of 12 to 40 rows (median 12 rows, 3.3 h); 30 have fewer than 20 rows and are judged" in text
     )

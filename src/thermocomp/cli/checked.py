@@ -1,6 +1,5 @@
 """Terminal output of `check`."""
 
-import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ from rich.console import Console
 
 from thermocomp.api.check import CheckedRecordings
 from thermocomp.cli.terminal import marked, print_table, words
-from thermocomp.judging.splits import MIN_ROWS
 from thermocomp.recordings.checks.findings import SEVERITIES, Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import records
@@ -21,8 +19,6 @@ _TONES = {"trouble": "grave", "warning": "doubtful", "info": "soft"}
 _GRADES = (*SEVERITIES, None)
 #: number of findings of one kind printed in full; for the rest only the channels are listed
 _FULL = 4
-#: more thermal cycles are summarised
-_MOST_CYCLES = 12
 
 
 def show_check(found: CheckedRecordings, console: Console) -> None:
@@ -48,28 +44,11 @@ def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Seq
         "displacement": displacements,
         "thermal cycle": sum(len(r["cycles"]) for r in contents),
     }
-    short = sum(c["stop"] - c["start"] < MIN_ROWS for r in contents for c in r["cycles"])
-    few = f" ({short} with fewer than {MIN_ROWS} rows)" * (short and amounts["thermal cycle"] > _MOST_CYCLES)
+    short = sum(records.count_short(r.cycles) for r in found.recordings)
+    few = f" ({short} of them short)" * (short > 0 and amounts["thermal cycle"] > records.MOST_CYCLES)
     told_amounts = ", ".join(_amount(n, what) for what, n in amounts.items())
     head = f"{told_amounts}{few}: {_amount(len(bad), 'problem')} found."
     return CommandAnswer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
-
-
-def _tell_cycles(r: Recording) -> str:
-    """Return the thermal cycles; of many only their sizes, and what becomes of the short ones."""
-    if len(r.cycles) <= _MOST_CYCLES:
-        return f"{len(r.cycles)} thermal cycle(s): " + ", ".join(
-            f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles
-        )
-    sizes = [len(c) for c in r.cycles]
-    median = statistics.median(sizes)
-    hours = median * r.sampling_interval / 3600
-    few = sum(n < MIN_ROWS for n in sizes)
-    short = f"; {few} have fewer than {MIN_ROWS} rows and are judged with the one before" * bool(few)
-    return (
-        f"{len(sizes)} thermal cycles of {min(sizes)} to {max(sizes)} rows (median {median:g} rows, {hours:.2g} h)"
-        f"{short}. --json and the page list them all."
-    )
 
 
 def _pairs(found: CheckedRecordings) -> list[tuple[Recording, Sequence[Finding]]]:
@@ -118,7 +97,7 @@ def _show(r: Recording, found: Sequence[Finding], content: dict[str, Any], conso
     )
     columns = (Column("channel", "name"), Column("quantity", "quantity"), Column("unit", "unit"), *records.RANGE)
     print_table(Layout(columns, content["channels"]), console)
-    console.print(words(_tell_cycles(r)))
+    console.print(words(records.describe_cycles(r)))
     told = {f.text for f in found}
     for note in r.notes:
         if note not in told:  # an excluded column is also a finding

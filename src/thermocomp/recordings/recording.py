@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,9 +17,6 @@ from thermocomp.core.exceptions import InputError, RecordingError, tell_nearest
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.frames import parts_of
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
 
@@ -159,20 +156,16 @@ class Recording:
         table.insert(0, "time_s", self.time)
         return table
 
-    def plot(self) -> "Figure":
-        """Return a figure of the channels over time [h], a panel per quantity."""
-        from matplotlib.figure import Figure
-
+    def plot(self) -> Any:
+        """Return a matplotlib figure of the channels over time [h], a panel per quantity."""
         quantities = list(dict.fromkeys((c.quantity, c.unit) for c in self.channels))
-        figure = Figure(figsize=(9.6, 0.8 + 2.2 * len(quantities)), layout="constrained")
-        for k, (quantity, unit) in enumerate(quantities, start=1):
-            ax = figure.add_subplot(len(quantities), 1, k)
-            for c in self.of_quantity(quantity):
-                ax.plot(self.time / 3600, self.table[c.name], lw=1.0, label=c.name)
+        panels = [tuple(c.name for c in self.channels if (c.quantity, c.unit) == q) for q in quantities]
+        table = self.table.set_axis(self.time / 3600)
+        size = (9.6, 0.8 + 2.2 * len(panels))
+        axes = table.plot(subplots=panels, figsize=size, lw=1.0, fontsize=8, layout=(len(panels), 1))[:, 0]
+        for ax, (quantity, unit) in zip(axes, quantities, strict=True):
             ax.set(ylabel=f"{quantity.replace('_', ' ')} [{unit}]", xlabel="time [h]")
-            ax.label_outer()
-            ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
-        return figure
+        return axes[0].figure
 
     def __len__(self) -> int:
         return len(self.time)

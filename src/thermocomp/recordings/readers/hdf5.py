@@ -66,21 +66,24 @@ def _split(
         for field in dataset.dtype.names:
             inner = dataset.dtype[field]
             if inner.subdtype is None and _kind(inner) in "fiubS":
-                yield Vector(dataset.name, field, "", dataset.size, partial(_load, dataset, field), _kind(inner))
+                load = partial(_load, dataset, field)
+                yield Vector(group=dataset.name, name=field, size=dataset.size, load=load, kind=_kind(inner))
     elif dataset.ndim == 2 and kind in "fiu" and min(dataset.shape) <= limits.columns:
         named = [(name, _texts(dataset.attrs[key])) for key in _NAMES if key in dataset.attrs]
         units = _texts(said)
         size, columns = max(dataset.shape), as_columns(name, dataset.shape, named or texts.get(group, []))
         for k, (label, index) in enumerate(columns):
             own = units[k].strip("[] ") if len(units) == len(columns) else unit
-            yield Vector(group, label, own, size, partial(_load, dataset, index), kind)
+            load = partial(_load, dataset, index)
+            yield Vector(group=group, name=label, unit=own, size=size, load=load, kind=kind)
     elif dataset.ndim == 1 and kind in "OS":
-        yield Vector(group, name, "", dataset.size, partial(_load_texts, dataset, path, limits), "O")
+        load = partial(_load_texts, dataset, path, limits)
+        yield Vector(group=group, name=name, size=dataset.size, load=load, kind="O")
     elif dataset.ndim == 1 and kind in "fiub":
         stamps = _text(dataset.attrs.get("kind", b"")).startswith("datetime64")  # an index of pandas
         load = partial(_load_stamps, dataset) if stamps else partial(_load, dataset, ())
-        waveform = find_waveform({} if stamps else dataset.attrs)
-        yield Vector(group, name, unit, dataset.size, load, "M" if stamps else kind, **waveform)
+        whole = {"size": dataset.size, "load": load, "kind": "M" if stamps else kind}
+        yield Vector(group=group, name=name, unit=unit, **whole, **find_waveform({} if stamps else dataset.attrs))
 
 
 def _place(dataset: "Dataset") -> tuple[str, str]:

@@ -132,7 +132,7 @@ def _table(group: str, table: pd.DataFrame) -> Iterator[Vector]:
 
 def _vector(group: str, name: str, values: NDArray[Any], unit: str) -> Vector:
     values = number_to_stamp(name, values, _DAYS, _ORIGIN, 86_400.0)
-    return Vector(group, name, unit, len(values), lambda: values, values.dtype.kind)
+    return Vector(group=group, name=name, unit=unit, size=len(values), load=lambda: values, kind=values.dtype.kind)
 
 
 def _texts(value: object) -> list[str]:

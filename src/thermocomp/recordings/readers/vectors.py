@@ -24,7 +24,7 @@ from thermocomp.recordings.readers.tables import FrameTable, check_headings, cle
 _MOST_NAMED = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Vector:
     """A vector of a file of arrays, not yet loaded.
 
@@ -49,9 +49,9 @@ class Vector:
 
     group: str
     name: str
-    unit: str
     size: int
     load: Callable[[], NDArray[Any]]
+    unit: str = ""
     kind: str = "f"
     step: float = 0.0
     start: int = 0
