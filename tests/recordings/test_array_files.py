@@ -15,8 +15,8 @@ import pytest
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from scipy.io import savemat
 
-from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
-from thermocomp.recordings.readers.mapping import Mapping, ReadOptions
+from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError, TwoReadingsError
+from thermocomp.recordings.readers.mapping import ColumnMap, Mapping, ReadOptions, TimeColumn
 from thermocomp.recordings.readers.recordings import read
 
 with warnings.catch_warnings():
@@ -197,8 +197,18 @@ def test_of_several_tables_one_is_asked_for(tmp_path: Path, ending: str) -> None
         read(path, Mapping(read=ReadOptions(sheet="c")))
 
 
+def test_columns_without_names_and_units_are_asked_for(tmp_path: Path) -> None:
+    savemat(tmp_path / "bare.mat", {"t": TIME, "T": SPINDLE, "z": PROBE})
+    with pytest.raises(TwoReadingsError, match="no time column found among t, T, z") as e:
+        read(tmp_path / "bare.mat")
+    assert e.value.remedies[0]["time"] == {"column": "t", "unit": "s"}
+    savemat(tmp_path / "one.mat", {"data": np.stack([TIME, SPINDLE, PROBE], axis=1)})
+    mapping = Mapping(TimeColumn("data1", "s"), {"t1_C": ColumnMap("data2", "degC", "temperature")})
+    assert np.allclose(read(tmp_path / "one.mat", mapping).table["t1_C"], SPINDLE)
+
+
 def test_values_without_times_are_refused_with_what_was_found(tmp_path: Path) -> None:
-    savemat(tmp_path / "bare.mat", {"spindle": SPINDLE, "probe": PROBE})
+    savemat(tmp_path / "bare.mat", {"a": {"spindle": SPINDLE}, "b": {"probe": PROBE}})
     with pytest.raises(
         RecordingError, match="no times beside the values: found 'spindle', 'probe'; export it with a vector"
     ):

@@ -131,7 +131,7 @@ def _table(group: str, table: pd.DataFrame) -> Iterator[Vector]:
 
 
 def _vector(group: str, name: str, values: NDArray[Any], unit: str) -> Vector:
-    values = number_to_stamp(name, values, _DAYS, _ORIGIN, 86_400.0)
+    values = number_to_stamp(values, _DAYS, _ORIGIN, 86_400.0)
     return Vector(group=group, name=name, unit=unit, size=len(values), load=lambda: values, kind=values.dtype.kind)
 
 

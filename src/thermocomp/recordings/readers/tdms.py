@@ -59,4 +59,4 @@ def _vector(channel: "TdmsChannel") -> Vector:
 
 
 def _load(channel: "TdmsChannel") -> NDArray[Any]:
-    return np.asarray(number_to_stamp(channel.name, channel[:], _SECONDS, _ORIGIN, 1.0))
+    return np.asarray(number_to_stamp(channel[:], _SECONDS, _ORIGIN, 1.0))

@@ -163,6 +163,8 @@ def _choose(path: Path, vectors: list[Vector], options: ReadOptions) -> tuple[li
     if stepped and not timed and max(Counter(v.heading for v in stepped).values()) == 1:
         return stepped, _tell_rest([v for group in groups.values() for v in group if not v.step], "without an interval")
     likely = timed or {v.group: groups[v.group] for v in stepped}
+    if not likely and len(groups) == 1 and len(vectors) > 1:
+        likely = timed = groups  # the columns are asked for, as in other files
     if not likely:
         names = ", ".join(repr(v.name) for v in vectors[:_MOST_NAMED]) + " ..." * (len(vectors) > _MOST_NAMED)
         raise RecordingError(
@@ -192,8 +194,8 @@ def _tell_rest(vectors: list[Vector], why: str) -> tuple[str, ...]:
     return (f"not read, {why}: {names}",) if names else ()
 
 
-def number_to_stamp(name: str, values: NDArray[Any], days: tuple[float, float], origin: float, day: float) -> Any:
-    """Return times counted from an origin of their own as timestamps; other vectors as they are.
+def number_to_stamp(values: NDArray[Any], days: tuple[float, float], origin: float, day: float) -> Any:
+    """Return increasing times counted from an origin of their own as timestamps; other vectors as they are.
 
     Parameters
     ----------
@@ -204,9 +206,9 @@ def number_to_stamp(name: str, values: NDArray[Any], days: tuple[float, float], 
     day : float
         Length of one unit of the numbers [s].
     """
-    if not is_time_name(name) or values.dtype.kind not in "fiu" or not values.size:
+    if values.dtype.kind not in "fiu" or not values.size or not (np.diff(values) > 0).all():
         return values
-    if not (days[0] <= np.nanmin(values) <= np.nanmax(values) < days[1]):
+    if not days[0] <= values[0] <= values[-1] < days[1]:
         return values
     return np.round((values - origin) * (day * 1e3)).astype("M8[ms]").astype("M8[ns]")
 
