@@ -49,8 +49,9 @@ bench: $(BENCH)/.bench
 	-scripts/system_packages.sh gcc linuxcnc-uspace mosquitto r-base-core r-cran-acepack r-cran-leaps valgrind
 	$(BENCH)/bin/python benchmarks/run.py
 
+# DOCS="-D plot_gallery=0" leaves out what takes longest: the examples and the papers' studies are not executed
 docs: $(VENV)/.docs
-	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going $(DOCS) -b html docs docs/_build/html
 
 verdicts: $(VENV)/.study
 	$(ONE_THREAD) $(BIN)/python scripts/verdicts.py $(STUDIES)
@@ -67,7 +68,7 @@ $(VENV)/.study: pyproject.toml
 	@touch $@
 
 $(VENV)/.dev: pyproject.toml
-	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live,onnx]' --group dev
+	scripts/make_venv.sh $(PYTHON) $(VENV) --editable '.[study,live,onnx,files]' --group dev
 	@touch $@ $(VENV)/.study
 
 $(BENCH)/.bench: pyproject.toml

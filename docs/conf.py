@@ -77,6 +77,7 @@ html_title = f"thermocomp {release}"
 html_show_sourcelink = False
 html_theme_options = {
     "footer_start": ["copyright"],
+    "header_links_before_dropdown": 3,  # one row on a screen of 1400 px
     "footer_end": [],
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],

@@ -187,7 +187,10 @@ sys.modules[__name__].__class__ = _FrontDoor
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'thermocomp' has no attribute {name!r}")
-    return getattr(import_module(_PUBLIC[name]), name)
+    from thermocomp.cli.extras import needs
+
+    with needs("study"):
+        return getattr(import_module(_PUBLIC[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -85,6 +85,22 @@ def test_three_kinds_of_models_in_one_comparison(recording: Recording) -> None:
     assert table.loc["ols", "rms"] == pytest.approx(ours.overall()[0].metric("rms"), rel=1e-12)
 
 
+def test_residuals_are_a_table_and_a_recording_a_figure(recording: Recording) -> None:
+    found = tc.compare(recording, ["z_um", "x_um"], "ols", robustness=False)
+    table = found.residuals()
+    assert table.columns.tolist() == ["target", "model", "recording", "time_s", "measured", "predicted", "residual"]
+    for (target, _), part in table.groupby(["target", "model"]):
+        (row,) = found.to_frame().query("target == @target")["rms"]
+        assert np.sqrt((part["residual"] ** 2).mean()) == pytest.approx(row)
+        at = np.searchsorted(recording.time, part["time_s"])
+        assert np.array_equal(recording.time[at], part["time_s"])
+        measured = recording.table[target].to_numpy()[at]
+        assert np.allclose(np.diff(part["measured"]), np.diff(measured))
+    panels = recording.plot().axes
+    assert [ax.get_ylabel() for ax in panels] == ["temperature [degC]", "spindle speed [1/min]", "displacement [um]"]
+    assert [len(ax.lines) for ax in panels] == [3, 1, 2]
+
+
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
     """Each kind of result, of the same small machine."""

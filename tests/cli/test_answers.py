@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 from smallmachine import small_machine
 
-from thermocomp.cli import answers
+from thermocomp.cli import answers, loudness
 from thermocomp.cli.answers import fold, free, print_answer
 from thermocomp.cli.app import run
+from thermocomp.cli.face import CommandFace
 from thermocomp.cli.terminal import make_console
 from thermocomp.recordings.readers import recordings
 from thermocomp.report.answer import CommandAnswer, few
@@ -168,6 +169,20 @@ def test_cells_keep_to_the_width_and_words_stay_whole(cells: tuple[str, str]) ->
     check_size(text)
     whole = [word for cell in cells for word in cell.split() if len(word) <= answers.WORD]
     assert all(word in text.split() for word in whole)
+
+
+def test_a_part_of_an_answer_counts_its_other_warnings(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`demo` prints the answer of `compare` as a part of its own, without its hint."""
+    monkeypatch.setattr(loudness, "details", False)
+    for warnings in (["a"], ["word " * 60, "b", "c"]):
+        made = CommandAnswer(head="Done.", warnings=warnings)
+        CommandFace(part=True).answer(dict, lambda made=made: made, lambda: None)  # type: ignore[misc]
+    first, second = capsys.readouterr().out.split("Done.")[1:]
+    assert first.split() == ["but", "a"]
+    assert " ".join(second.split()).endswith("word ... (2 more: --details)")
+    check_size(second)
 
 
 def test_text_that_is_cut_says_so() -> None:

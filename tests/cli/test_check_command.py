@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from smallmachine import small_machine
 
@@ -38,6 +39,21 @@ def test_one_file_is_told_in_full(files: list[str], capsys: pytest.CaptureFixtur
     assert "4 thermal cycle(s)" in text
     assert run(["check", files[0], "--details"]) == 0
     assert "nothing wrong found" in capsys.readouterr().out
+
+
+def test_many_cycles_are_summarised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = small_machine([1000.0 + 40 * k for k in range(30)], dt=1000.0).table
+    more = table.iloc[:40].assign(spindle_rpm=1500.0)
+    table = pd.concat([table, more], ignore_index=True)
+    table.insert(0, "time_s", 1000.0 * np.arange(len(table)))
+    table.to_csv(tmp_path / "month.csv", index=False)
+    run(["check", str(tmp_path / "month.csv"), "--details"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert "31 thermal cycles (30 of them short): " in text
+    assert (
+        "31 thermal cycles of 12 to 40 rows (median 12 rows, 3.3 h); 30 have fewer than 20 rows and are judged" in text
+    )
+    assert "20 (" not in text
 
 
 def test_files_get_a_line_each_the_worst_first(files: list[str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -131,20 +131,21 @@ def test_fit_assess_and_their_exit_codes(drift: Path, tmp_path: Path, capsys: py
     assert run(["assess", str(model), str(other), "--details"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "% of the judged rows, with a mean half-width" in said
-    assert "in-sample" not in said
+    assert "not unseen" not in said
     assert [r["block"] for r in results] == ["cycle 1 (2200 1/min)", "cycle 2 (1200 1/min)", "all cycles"]
     assert set(results[-1]["robustness"]["noise_rms_um"]) == {"uniform", "normal"}
     assert run(["assess", str(model), str(drift), "--details"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert "not a test on unseen data: fitted to drift" in said
-    assert "│ averaged, │" in said
-    assert "│ in-sample │" in said
-    assert "in-sample: on the rows used for training" in said
+    assert re.search(r"│ averaged │.* │ not unseen │", said)
     assert "% of the judged rows, which were used for training, with a mean half-width" in said
     copy = drift.with_name("copy.csv")
     copy.write_text(drift.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     assert run(["assess", str(model), str(copy)]) == 1  # the same test in another file
-    assert "fitted to copy" in " ".join(capsys.readouterr().out.split())
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.startswith("On these recordings: not unseen for z_um.")
+    assert "fitted to copy" in said
+    assert "refused" not in said
 
 
 def test_assess_leaves_out_what_was_learned_from(
@@ -158,7 +159,7 @@ def test_assess_leaves_out_what_was_learned_from(
     assert run(["assess", str(model), str(copy), "--json"]) == 1
     found = printed(capsys)
     assert found["seen_in_training"] == []
-    assert found["results"][-1]["verdict"] == "refused"
+    assert found["results"][-1]["verdict"] == "not unseen"
     reason = "not a test on unseen data: 239 of 239 rows were used for training; judge the model on another recording"
     assert found["results"][-1]["reason"] == reason
     first, day = small_machine(dt=200.0), small_machine((2200.0, 1200.0), seed=3, dt=200.0)
@@ -351,6 +352,9 @@ def test_the_base_install_says_what_to_install(drift: Path) -> None:
     )
     assert refused.returncode == 2
     assert "pip install 'thermocomp[study]'" in refused.stderr
+    code = blocked + "import thermocomp\nthermocomp.read"
+    python = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "pip install 'thermocomp[study]'" in python.stderr.splitlines()[-1]
 
 
 def test_the_running_wing_loads_nothing_of_the_training_wing() -> None:

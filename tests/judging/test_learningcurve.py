@@ -9,6 +9,7 @@ from smallmachine import small_machine
 
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging import budget
+from thermocomp.judging.compare import compare
 from thermocomp.judging.planning.learningcurve import LearningCurve, Point, learning_curve, n_pieces
 from thermocomp.judging.splits import Judging, Split, leave_one_cycle_out
 from thermocomp.recordings.samples import Samples
@@ -20,8 +21,8 @@ def small(speeds: Sequence[float] = (1000.0, 2500.0, 1800.0, 3000.0)) -> Samples
 
 
 def curve_of(errors: dict[int, float], none: float = 40.0) -> LearningCurve:
-    points = [Point(n, n, block, rms) for n, rms in errors.items() for block in (0, 1)]
-    return LearningCurve("averaged", tuple(points), none)
+    points = [Point(n, n, block, (rms,)) for n, rms in errors.items() for block in (0, 1)]
+    return LearningCurve("averaged", tuple(points), none, np.ones((2, 1)))
 
 
 def test_more_cycles_leave_less_on_an_unseen_one() -> None:
@@ -40,6 +41,22 @@ def test_more_cycles_leave_less_on_an_unseen_one() -> None:
     assert {p.unseen for p in found.points} == {0, 1, 2, 3}
     assert len(told) == len(found.points) <= n_pieces(judging)
     assert learning_curve(samples, judging).points == found.points  # the draw is the same
+
+
+def test_its_last_level_is_the_error_that_compare_states() -> None:
+    """The RMS over all unseen rows, not the mean over the cycles; blocks count by their rows."""
+    samples = small()
+    samples = samples.take(np.arange(len(samples)) < 750)  # the last cycle is shorter
+    judging = leave_one_cycle_out(samples)
+    found = learning_curve(samples, judging)
+    (level,) = [x for x in found.by_cycles() if x.learned == 3]
+    (overall,) = compare(samples, ["averaged"], judging, robustness=False).overall()
+    assert level.rms == pytest.approx(overall.metric("rms"), rel=1e-6)
+    assert found.none == pytest.approx(overall.none_metric("rms"), rel=1e-9)
+    two = LearningCurve("m", (Point(1, 1, 0, (3.0,)), Point(1, 1, 1, (6.0,))), 9.0, np.array([[300.0], [100.0]]))
+    (pooled,) = two.by_cycles()
+    assert pooled.rms == pytest.approx(np.sqrt((3 * 9 + 36) / 4))
+    assert pooled.error == pytest.approx(1.5)  # leaving out either block: 6 or 3
 
 
 def test_what_is_learned_from_never_holds_the_unseen_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,5 +110,5 @@ def test_a_part_that_cannot_be_learned_from_is_left_out() -> None:
     tiny[:2] = True
     judging = Judging("cycles", (*splits[1:], Split("cycle tiny", ~tiny, tiny)))
     found = learning_curve(samples, judging)
-    assert any(np.isnan(p.rms) for p in found.points)
+    assert any(not p.rms for p in found.points)
     assert all(np.isfinite(x.rms) for x in found.by_cycles())

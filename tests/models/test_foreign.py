@@ -132,12 +132,43 @@ def test_a_named_estimator_survives_the_way_to_another_process() -> None:
     assert expand([name, "all"]) == ["DynamicRidge", *METHODS]
 
 
+class Bare:
+    """A regressor by protocol alone, without a base class of scikit-learn."""
+
+    def __init__(self, share: float = 1.0) -> None:
+        self.share = share
+
+    def get_params(self, deep: bool = True) -> dict[str, float]:
+        return {"share": self.share}
+
+    def set_params(self, **params: float) -> "Bare":
+        self.share = params.get("share", self.share)
+        return self
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> "Bare":
+        self.slopes_ = self.share * np.linalg.lstsq(np.asarray(X), np.asarray(y))[0]
+        return self
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        return np.asarray(np.asarray(X) @ self.slopes_)
+
+
+class Sorter(Bare):
+    _estimator_type = "classifier"
+
+
+def test_a_regressor_needs_no_base_class(samples: Samples) -> None:
+    assert rms(samples, [Bare()])["Bare"] == pytest.approx(rms(samples, [Plane()])["Plane"])
+    assert rms(samples, [Bare(0.5)])["Bare"] > 1.5 * rms(samples, [Plane()])["Plane"]
+
+
 @pytest.mark.parametrize(
     ("thing", "message"),
     [
         (Plane, r"Plane is a class: pass an instance, Plane\(\)"),
         (3.0, "float is not a regressor: name a method, or pass an instance"),
         (StandardScaler(), "StandardScaler is not a regressor"),
+        (Sorter(), "Sorter is not a regressor"),
         (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) treats every row as a steady state"),
         (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot pass it the time here"),
         (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),

@@ -163,14 +163,14 @@ def test_volts_are_left_out_with_the_keys_of_their_sensitivity(tmp_path: Path) -
     assert np.allclose(read(path, read_mapping(mapping)).table["z_um"], PROBE)
 
 
-@pytest.mark.parametrize(("first", "far"), [(6.0, False), (12.0, True)])
+@pytest.mark.parametrize(("first", "far"), [(0.0, False), (6.0, False), (12.0, True)])
 def test_check_and_fit_judge_the_start_alike(tmp_path: Path, first: float, far: bool) -> None:
     z = first + 106 * (1 - np.exp(-np.arange(N) / 20))
     rows = "".join(f"{k * STEP},{SPINDLE[k]},8000,{z[k]}\n" for k in range(N))
     recording = read(written(tmp_path, "a.csv", f"time_s,Spindle_C,spindle_rpm,z_um\n{rows}"))
-    kinds = [f.kind for f in check(recording)]
+    kinds = {f.kind: f.severity for f in check(recording)}
     assert ("not zeroed" in kinds) is far
-    assert "turning start" in kinds
+    assert kinds["turning start"] == ("warning" if first > 3 else "info")
     if far:
         with pytest.raises(Exception, match="not zeroed at the start"):
             find_starts([recording], [recording.channel("z_um")], zeroing=find_zeroing(recording))

@@ -143,8 +143,8 @@ def test_without_a_failure_there_is_a_sentence() -> None:
 
 def test_the_verdict_stands_out_by_what_it_is(judged: Judged, recording: Recording) -> None:
     (whole,) = judged.overall()
-    refused = replace(judged, assessments=(replace(whole, caveat="not a test on unseen data"),))
-    assert '<p class="verdict">z_um: refused' in assessed.render(refused, [recording])
+    known = replace(judged, assessments=(replace(whole, caveat="not a test on unseen data"),))
+    assert '<p class="verdict">z_um: not unseen' in assessed.render(known, [recording])
     sound = failing()  # a correction that is held for want of sensors is not accepted
     judged = assessing.assess([watched_model()], [sound], starts=Start())
     (whole,) = judged.overall()

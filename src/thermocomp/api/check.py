@@ -90,7 +90,7 @@ def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> 
     Parameters
     ----------
     recordings : Recording, path, DataFrame, or sequence of them
-        Files (CSV, XLSX, ODS or Parquet) or tables; each one is a separate test.
+        Files (CSV, XLSX, ODS, Parquet, TDMS, HDF5, MAT) or tables; each one is a separate test.
     mapping : str, Path or Mapping, optional
         TOML mapping file: role and unit of each column.
 

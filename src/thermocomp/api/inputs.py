@@ -42,7 +42,7 @@ def read(path: str | Path, mapping: str | Path | mappings.Mapping | None = None)
     Parameters
     ----------
     path : str or Path
-        A file ending in .csv, .tsv, .txt, .xlsx, .ods or .parquet.
+        A file of a logger or program, such as .csv, .xlsx, .ods, .parquet, .tdms, .h5 or .mat.
     mapping : str, Path or Mapping, optional
         TOML mapping file, or the mapping read from one: role and unit of columns whose headings do not give them.
 

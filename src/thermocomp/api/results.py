@@ -161,6 +161,10 @@ class Compared(Result, Paged):
             ["target", "rms"], key=lambda c: c.map(order) if c.name == "target" else c, ignore_index=True
         )
 
+    def residuals(self) -> pd.DataFrame:
+        """Return a row per unseen row of each target and model: measured, predicted, residual [unit of the target]."""
+        return _residuals(self.comparison.assessments, self.recordings)
+
     def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
         """Return a figure of the errors of all models; or of a model over time, for a target, on the unseen blocks.
 
@@ -287,6 +291,10 @@ class FittedModels(Result):
         table["formula"] = [m.formula() for m in self.fitted.models]
         return table
 
+    def residuals(self) -> pd.DataFrame:
+        """Return a row per unseen row of each target and model: measured, predicted, residual [unit of the target]."""
+        return _residuals(self.fitted.comparison.assessments, self.recordings)
+
     def plot(self, target: str | None = None) -> "Figure":
         """Return a figure of the method over time on the unseen blocks, for the first target or a given one."""
         return _run(self.fitted.comparison.assessments, self.recordings, target or self.fitted.models[0].target, None)
@@ -355,6 +363,10 @@ class Assessed(Result, Paged):
         table.insert(4, "stated_rms", table["target"].map(self.judged.stated))
         return table
 
+    def residuals(self) -> pd.DataFrame:
+        """Return a row per judged row of each target and model: measured, predicted, residual [unit of the target]."""
+        return _residuals(self.judged.assessments, self.recordings)
+
     def plot(self, target: str | None = None) -> "Figure":
         """Return a figure of the model over time on the recordings, for the first target or a given one."""
         return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
@@ -367,6 +379,26 @@ class Assessed(Result, Paged):
 
     def __str__(self) -> str:
         return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])
+
+
+def _residuals(assessments: Sequence[Assessment], recordings: Sequence[Recording]) -> pd.DataFrame:
+    """Return measured and predicted deviations of all judged rows, and the residuals."""
+    parts = [
+        pd.DataFrame(
+            {
+                "target": a.target,
+                "model": str(a.model),
+                "recording": [recordings[k].name for k in a.test.tolist()],
+                "time_s": [recordings[k].time[row] for k, row in zip(a.test.tolist(), a.row.tolist(), strict=True)],
+                "measured": a.measured,
+                "predicted": a.predicted,
+                "residual": a.measured - a.predicted,
+            }
+        )
+        for a in assessments
+        if a.overall and not a.failure
+    ]
+    return pd.concat(parts, ignore_index=True)
 
 
 def _judged(a: Assessment) -> str:

@@ -55,7 +55,7 @@ def compare(
     Parameters
     ----------
     recordings : Recording, path, DataFrame, or sequence of them
-        Files (CSV, XLSX, ODS or Parquet) or tables; each one is a separate test.
+        Files (CSV, XLSX, ODS, Parquet, TDMS, HDF5, MAT) or tables; each one is a separate test.
     targets : str or sequence of str, optional
         Displacement channels to predict. Default: all of the first recording.
     models : str, estimator, or sequence of them

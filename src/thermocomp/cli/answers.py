@@ -50,7 +50,9 @@ def count_others(number: int) -> str:
     return f" ({number} more: --details)" if number else ""
 
 
-def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, room: int = LINES - BEFORE) -> None:
+def print_answer(
+    answer: CommandAnswer, console: Console, *, hint: bool = True, count: bool = False, room: int = LINES - BEFORE
+) -> None:
     """Print an answer.
 
     Parameters
@@ -59,6 +61,8 @@ def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, 
     console : Console
     hint : bool
         Say that ``--details`` prints more.
+    count : bool
+        Without the hint: add the number of further warnings to the first.
     room : int
         Largest number of lines.
     """
@@ -67,10 +71,12 @@ def print_answer(answer: CommandAnswer, console: Console, *, hint: bool = True, 
         written = fold(written[0], 2, console.width)
     following = _command(answer.following, console.width) if answer.following else []
     warned = [PrintedLine(text, Toned("Warning: ", "doubtful")) for text in answer.warnings[:1]]
+    uncounted = count_others(max(len(answer.warnings) - 1, 0)) if count else ""
     left = room - len(written) - hint - len(following)
     for head, each in ((3, 2), (2, 2), (2, 1), (1, 1)):
         first = _folded(PrintedLine(answer.head), head, console) if answer.head else []
-        others = [text for line in (*answer.lines, *warned) for text in _folded(line, each, console)]
+        others = [text for line in answer.lines for text in _folded(line, each, console)]
+        others += [text for line in warned for text in _folded(line, each, console, uncounted)]
         if len(first) + len(others) <= left:
             break
     _print(first, console)

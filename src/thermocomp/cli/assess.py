@@ -21,8 +21,8 @@ def assess(found: Assessed, face: CommandFace) -> int:
     Returns
     -------
     int
-        0 no model refused, 1 a model was refused here or when it was fitted, or was trained on all rows given to judge
-        it, 2 unusable input.
+        0 no model refused, 1 a model was refused here or when it was fitted, or the recordings are not unseen, since it
+        was trained on all their rows, 2 unusable input.
     """
     face.write(found.report)
     face.answer(
@@ -31,7 +31,7 @@ def assess(found: Assessed, face: CommandFace) -> int:
         lambda: print_items(printed.assess(found.judged, found.recordings), console),
     )
     before = {m.honest_error.word for m in found.judged.models if m.honest_error is not None}
-    return 1 if "refused" in before | {a.word for a in found.judged.overall()} else 0
+    return 0 if {"refused", "not unseen"}.isdisjoint(before | {a.word for a in found.judged.overall()}) else 1
 
 
 def _following(found: Assessed, face: CommandFace) -> tuple[str, ...]:

@@ -42,7 +42,10 @@ def answer_check(found: CheckedRecordings, files: Sequence[Path], following: Seq
         "displacement": displacements,
         "thermal cycle": sum(len(r["cycles"]) for r in contents),
     }
-    head = f"{', '.join(_amount(n, what) for what, n in amounts.items())}: {_amount(len(bad), 'problem')} found."
+    short = sum(records.count_short(r.cycles) for r in found.recordings)
+    few = f" ({short} of them short)" * (short > 0 and amounts["thermal cycle"] > records.MOST_CYCLES)
+    told_amounts = ", ".join(_amount(n, what) for what, n in amounts.items())
+    head = f"{told_amounts}{few}: {_amount(len(bad), 'problem')} found."
     return CommandAnswer(head=head, table=_overview(contents), warnings=bad, files=files, following=following)
 
 
@@ -92,8 +95,7 @@ def _show(r: Recording, found: Sequence[Finding], content: dict[str, Any], conso
     )
     columns = (Column("channel", "name"), Column("quantity", "quantity"), Column("unit", "unit"), *records.RANGE)
     print_table(Layout(columns, content["channels"]), console)
-    cycles = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
-    console.print(f"{len(r.cycles)} thermal cycle(s): {words(cycles)}")
+    console.print(words(records.describe_cycles(r)))
     told = {f.text for f in found}
     for note in r.notes:
         if note not in told:  # an excluded column is also a finding

@@ -10,6 +10,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "study": ("jinja2", "joblib", "matplotlib", "openpyxl", "pandas", "pyarrow", "scipy", "sklearn"),
     "live": ("aiomqtt", "fastapi", "jinja2", "uvicorn"),
     "opcua": ("asyncua",),
+    "files": ("h5py", "matio", "nptdms"),
     "onnx": ("onnx",),
     "dask": ("dask", "distributed"),
 }

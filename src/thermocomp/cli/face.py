@@ -112,9 +112,8 @@ class CommandFace:
 
         def show() -> None:
             told = replace(made(), files=(), following=()) if self.part else made()
-            print_answer(
-                told, console, hint=not (self.part or loudness.details), room=LINES - (OTHERS if self.part else BEFORE)
-            )
+            short, room = not loudness.details, LINES - (OTHERS if self.part else BEFORE)
+            print_answer(told, console, hint=short and not self.part, count=short and self.part, room=room)
             if loudness.details:
                 console.print()
                 details()

@@ -119,7 +119,7 @@ def _show(found: Planned) -> None:
             Column("unseen RMS", lambda x: x.rms, ".2f", "um"),
             Column("+-", lambda x: x.error, ".2f", "um"),
         )
-        none = f"mean over targets and unseen cycles; without compensation {found.curve.none:.2f} um"
+        none = f"over all unseen rows, mean over targets; without compensation {found.curve.none:.2f} um"
         print_table(Layout(levels, found.curve.by_cycles(), caption=none), console)
         speeds = (Column("training speeds", lambda x: x.learned, ">"), *levels[1:])
         print_table(Layout(speeds, found.curve.by_speeds()), console)

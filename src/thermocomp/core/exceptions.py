@@ -126,7 +126,7 @@ class MissingExtraError(ThermocompError):
 
     def __init__(self, extra: str, missing: str) -> None:
         super().__init__(
-            f"this command needs the extra '{extra}' (module '{missing}' is not installed); "
+            f"this needs the extra '{extra}' (module '{missing}' is not installed); "
             f"install it with: pip install 'thermocomp[{extra}]' (in a clone: pip install '.[{extra}]')"
         )
         self.extra = extra

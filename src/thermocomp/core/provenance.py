@@ -67,7 +67,7 @@ PREDICTED = 1.25
 Word = Literal["accepted", "accepted for this duty", "unproven", "refused"]
 
 
-def accepted(word: Word) -> bool:
+def accepted(word: str) -> bool:
     """Return whether a verdict permits a model to run."""
     return word in ("accepted", "accepted for this duty")
 

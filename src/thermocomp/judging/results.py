@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,10 +204,12 @@ class Assessment:
         return accepted(self.word)
 
     @property
-    def word(self) -> Word:
-        """``accepted``, ``accepted for this duty``, ``unproven`` or ``refused``."""
-        if self.failure or self.caveat:
+    def word(self) -> Word | Literal["not unseen"]:
+        """``accepted``, ``accepted for this duty``, ``unproven``, ``refused`` or, on training data, ``not unseen``."""
+        if self.failure:
             return "refused"
+        if self.caveat:
+            return "not unseen"
         return "unproven" if self._fragile else self.verdict.word
 
     @property

@@ -152,10 +152,10 @@ def _write(
 
 def honest_error(overall: Assessment, judging: Judging) -> HonestError:
     """Summarise an assessment for the model file."""
-    if overall.failure:
-        raise InputError(f"{overall.target} cannot be judged: {overall.failure}")
-    rms, none = overall.metric("rms"), overall.none_metric("rms")
     word, reason = overall.word, overall.reason
+    if overall.failure or word == "not unseen":
+        raise InputError(f"{overall.target} cannot be judged: {overall.failure or reason}")
+    rms, none = overall.metric("rms"), overall.none_metric("rms")
     if accepted(word) and rms > none:  # one long cycle, within the margin, against many short ones
         word, reason = "unproven", f"{reason}; over all rows RMS {rms:.2f}, {none:.2f} without compensation"
     return HonestError(

@@ -108,10 +108,11 @@ def adopt_estimator(estimator: Any) -> Any:
         return estimator
     if isinstance(estimator, Pipeline) and freezes(estimator):
         return PipelineRegressor(estimator)
-    if not isinstance(estimator, BaseEstimator) or not (is_regressor(estimator) or hasattr(estimator, "freeze")):
+    if not _is_regressor(estimator) and not (isinstance(estimator, BaseEstimator) and hasattr(estimator, "freeze")):
         raise InputError(
-            f"{type(estimator).__name__} is not a regressor: name a method, or pass an instance of a class derived "
-            "from sklearn.base.RegressorMixin and BaseEstimator, with fit(X, y) and predict(X)"
+            f"{type(estimator).__name__} is not a regressor: name a method, or pass an instance of a class with "
+            "fit(X, y), predict(X), get_params and set_params, such as one derived from RegressorMixin and "
+            "BaseEstimator of sklearn.base"
         )
     for name, part in estimator.get_params().items():
         if isinstance(part, TimedRegressor):
@@ -120,6 +121,14 @@ def adopt_estimator(estimator: Any) -> Any:
                 "use it alone, or in a Pipeline of selectors and one method that can be frozen"
             )
     return estimator if hasattr(estimator, "freeze") else ForeignRegressor(estimator)
+
+
+def _is_regressor(estimator: Any) -> bool:
+    """Return whether an object follows scikit-learn's protocol of a regressor, also without its base classes."""
+    if isinstance(estimator, BaseEstimator):
+        return bool(is_regressor(estimator))
+    protocol = all(callable(getattr(estimator, name, None)) for name in ("fit", "predict", "get_params", "set_params"))
+    return protocol and getattr(estimator, "_estimator_type", "regressor") == "regressor"
 
 
 def title(estimator: Any) -> str:

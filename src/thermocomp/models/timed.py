@@ -32,8 +32,10 @@ REMEDY = (
     "time='column' if the first column of X is the time since the start of the row's test [s], or time='routed' to "
     "pass dt by scikit-learn's metadata routing"
 )
-_WHOLE = "give every test from its start: leave whole tests out (groups=, LeaveOneGroupOut)"
-_OURS = "thermocomp.compare(..., leave_one='cycle') judges a thermal cycle from the middle of a test"
+_WHOLE = (
+    "leave whole tests out (groups=table.test), or judge the cycles of one recording with thermocomp.compare(..., "
+    "leave_one='cycle')"
+)
 
 
 class TimedRegressor(ThermalRegressor):
@@ -283,9 +285,8 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
     late = np.flatnonzero(starts & (np.abs(time) > 1e-6))
     if late.size:
         raise InputError(
-            f"time='column': at row {late[0]} a test begins at {time[late[0]]:g} s and not at 0. Either the first "
-            "column of X is not the time since the start of the test [s], or the start was left out: "
-            f"{_WHOLE}; {_OURS}"
+            f"time='column': at row {late[0]} a test begins at {time[late[0]]:g} s and not at 0. Its start was left "
+            f"out: {_WHOLE}; or the first column of X is not the time since the start of the test [s]"
         )
     if fitting and time.max() < LEAST:
         raise InputError(
@@ -297,7 +298,7 @@ def derive_steps(time: FloatArray, index: object = None, *, fitting: bool = Fals
         row = int(np.flatnonzero(~starts & (step > GAP * np.median(inside)))[0])
         raise InputError(
             f"time='column': row {row} comes {step[row]:g} s after the previous row, where {np.median(inside):g} s are "
-            f"usual, so rows are missing: {_WHOLE}; {_OURS}. For a pause in the recording itself, use time='routed'"
+            f"usual, so rows are missing: {_WHOLE}. For a pause in the recording itself, use time='routed'"
         )
     _refuse_holes(index, starts)
     return step
@@ -314,7 +315,7 @@ def _routed(dt: ArrayLike | None, n_rows: int, name: str) -> FloatArray:
     if n_rows and not np.isinf(step[0]):
         raise InputError(
             f"dt: the first row is {step[0]:g} s after another row, but a test must start with inf. The start of the "
-            f"test was left out: {_WHOLE}; {_OURS}"
+            f"test was left out: {_WHOLE}"
         )
     if not hasattr(dt, "index") and get_config()["enable_metadata_routing"]:
         raise InputError(
@@ -337,6 +338,6 @@ def _refuse_holes(index: Any, starts: NDArray[np.bool_]) -> None:
     if (apart != usual).any():
         row = int(np.flatnonzero(~starts)[np.argmax(apart != usual)])
         raise InputError(
-            f"rows are missing between index {labels[row - 1]} and {labels[row]}: {_WHOLE}; {_OURS}. "
+            f"rows are missing between index {labels[row - 1]} and {labels[row]}: {_WHOLE}. "
             "If these rows never existed: reset_index(drop=True)"
         )

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -154,6 +155,17 @@ class Recording:
         table = self.table.reset_index(drop=True)
         table.insert(0, "time_s", self.time)
         return table
+
+    def plot(self) -> Any:
+        """Return a matplotlib figure of the channels over time [h], a panel per quantity."""
+        quantities = list(dict.fromkeys((c.quantity, c.unit) for c in self.channels))
+        panels = [tuple(c.name for c in self.channels if (c.quantity, c.unit) == q) for q in quantities]
+        table = self.table.set_axis(self.time / 3600)
+        size = (9.6, 0.8 + 2.2 * len(panels))
+        axes = table.plot(subplots=panels, figsize=size, lw=1.0, fontsize=8, layout=(len(panels), 1))[:, 0]
+        for ax, (quantity, unit) in zip(axes, quantities, strict=True):
+            ax.set(ylabel=f"{quantity.replace('_', ' ')} [{unit}]", xlabel="time [h]")
+        return axes[0].figure
 
     def __len__(self) -> int:
         return len(self.time)

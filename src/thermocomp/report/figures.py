@@ -82,7 +82,7 @@ def overview(comparison: Comparison) -> Drawn:
             ax.axvline(mine[0].none_metric("rms"), color=NONE, lw=2.5, zorder=2)
             for a in mine:
                 if not a.failure:
-                    face = FILLED[a.word]
+                    face = FILLED.get(a.word, "white")
                     ax.plot(a.metric("rms"), models.index(a.model), "o", color=PREDICTED, mfc=face, ms=5, zorder=3)
             name_ticks(ax.yaxis, models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)

@@ -29,7 +29,9 @@ class Toned(str):
 
 def verdict(word: str) -> Toned:
     """Return a verdict as text, highlighted as good, doubtful or bad."""
-    return Toned(word, {"accepted": "good", "unproven": "doubtful"}.get(word.partition(" ")[0], "bad"))
+    return Toned(
+        word, {"accepted": "good", "unproven": "doubtful", "not": "doubtful"}.get(word.partition(" ")[0], "bad")
+    )
 
 
 @dataclass(frozen=True)

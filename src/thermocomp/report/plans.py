@@ -94,14 +94,15 @@ def _draw_tests(ax: Axes, plan: Plan) -> None:
 def _draw_curve(ax: Axes, curve: LearningCurve) -> None:
     """Plot the error against the number of training cycles."""
     levels = curve.by_cycles()
-    ax.plot([p.learned for p in curve.points], [p.rms for p in curve.points], ".", color="#bbbbbb")
+    fitted = [p for p in curve.points if p.rms]
+    ax.plot([p.learned for p in fitted], [np.mean(p.rms) for p in fitted], ".", color="#bbbbbb")
     learned, rms = [x.learned for x in levels], [x.rms for x in levels]
-    ax.plot(learned, rms, "o-", color=PREDICTED, label=f"{curve.model}: mean and standard error")
+    ax.plot(learned, rms, "o-", color=PREDICTED, label=f"{curve.model}: all unseen rows, and standard error")
     ax.errorbar(learned, rms, [x.error for x in levels], fmt="none", ecolor=PREDICTED, capsize=2)
     ax.axhline(curve.none, color="#999999", ls="--", lw=0.8, label="no compensation")
     ax.set_ylim(bottom=0)
     ax.set_xlabel("training cycles")
-    ax.set_ylabel("error on an unseen cycle [um RMS]")
+    ax.set_ylabel("error on unseen cycles [um RMS]")
     ax.set_title("learning curve")
     add_legend(ax)
 

@@ -1,6 +1,7 @@
 """Terminal output of results, as a sequence of lines and tables."""
 
 from collections.abc import Iterator, Sequence
+from statistics import median
 
 from thermocomp.core.starting import describe_offsets
 from thermocomp.judging import coverage
@@ -22,6 +23,8 @@ from thermocomp.report.probings import describe_gains, describe_probings
 from thermocomp.report.running import describe_running
 from thermocomp.report.summary import cautions, describe_choice, describe_unlike
 
+#: of more unseen cycles than this only the worst are listed
+_MOST_CYCLES, _WORST = 25, 12
 BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
 
@@ -184,17 +187,14 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
             held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
             sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))
-            name = f"{a.model}, in-sample" if a.caveat else a.model
-            rows.append((name, *figures, less, *held, sensors, verdict(a.word)))
+            rows.append((a.model, *figures, less, *held, sensors, verdict(a.word)))
     band = (("held", ">"), ("+-", ".2f")) if banded else ()
     headings = (*((h, ".2f") for h in metrics), ("less", ">"), *band, ("sensors", ">"), ("verdict", ""))
     columns = (Column("", 0), *(Column(h, k, form, whole=True) for k, (h, form) in enumerate(headings, start=1)))
     return Layout(
         columns,
         rows,
-        caption="residual in um on the judged rows; less: reduction of the RMS"
-        + ("; in-sample: on the rows used for training" if any(a.caveat for a in assessments) else "")
-        + _band_words(assessments),
+        caption="residual in um on the judged rows; less: reduction of the RMS" + _band_words(assessments),
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),
     )
@@ -208,7 +208,10 @@ def _band_words(assessments: Sequence[Assessment]) -> str:
 
 
 def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
-    """Return the RMS in each unseen cycle, a section per target; rows are models or cycles, whichever are more."""
+    """Return the RMS in each unseen cycle, a section per target; rows are models or cycles, whichever are more.
+
+    Of many cycles only the worst are listed, and the median of all.
+    """
     models = ["none", *dict.fromkeys(a.model for a in assessments)]
     cycles = list(dict.fromkeys(c.name for a in assessments for c in a.verdict.units))
     down, across = (models, cycles) if len(models) > len(cycles) + 1 else (cycles, models)
@@ -220,13 +223,29 @@ def _cycle_table(assessments: Sequence[Assessment]) -> Layout:
         cells |= {("none", c.name): f"{c.none_rms:.2f}{space}" for a in mine for c in a.verdict.units}
         sections.add(len(rows))
         rows.append((Toned(mine[0].target, "strong"), *([""] * len(across))))
-        for name in down:
+        units = [c for a in mine for c in a.verdict.units]
+        many = down is cycles and len({c.name for c in units}) > _MOST_CYCLES
+        for name in _worst(units) if many else down:
             keys = [(name, other) if down is models else (other, name) for other in across]
             if any(k in cells for k in keys):
                 rows.append((f"  {name}", *(cells.get(k, "") for k in keys)))
+        if many:
+            by_model = {"none": [c.none_rms for c in mine[0].verdict.units]}
+            by_model |= {a.model: [c.rms for c in a.verdict.units] for a in mine}
+            told = (f"{median(by_model[m]):.2f} " if m in by_model else "" for m in models)
+            rows.append((f"  median of all {len(mine[0].verdict.units)}", *told))
     columns = (Column(h, k, ">", whole=across is models) for k, h in enumerate(across, start=1))
     caption = "RMS in um in each judged cycle, or in the judged part of it; ! = harmful"
     return Layout((Column("", 0, whole=True), *columns), rows, caption=caption, sections=frozenset(sections))
+
+
+def _worst(units: Sequence[JudgedUnit]) -> list[str]:
+    """Return the names of the cycles that are harmful or have the largest RMS of any model, in chronological order."""
+    worst: dict[str, tuple[bool, float]] = {}
+    for c in units:
+        worst[c.name] = max(worst.get(c.name, (False, 0.0)), (c.harmful, c.rms))
+    least = sorted(worst.values())[-_WORST]
+    return [name for name, value in worst.items() if value >= least]
 
 
 def _passed(cycle: JudgedUnit) -> str:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,14 @@ from thermocomp.core.machine import Channel
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.inuse import WEIGHTS
 from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.splits import MIN_ROWS
 from thermocomp.recordings.checks.findings import Finding
+from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.layout import Column
 
+#: more thermal cycles are summarised
+MOST_CYCLES = 12
 #: maximum number of values of a remedy shown
 _FEW = 6
 #: columns of a channel table: range of the values, and missing values
@@ -25,6 +30,26 @@ RANGE = (
     Column("largest", "largest", ".4g"),
     Column("missing", lambda c: c["missing"] or "", ">"),
 )
+
+
+def count_short(cycles: Sequence[Cycle]) -> int:
+    """Return the number of thermal cycles that are too short to be judged alone."""
+    return sum(len(c) < MIN_ROWS for c in cycles)
+
+
+def describe_cycles(r: Recording) -> str:
+    """Return the thermal cycles as text; of many only their sizes, and what becomes of the short ones."""
+    if len(r.cycles) <= MOST_CYCLES:
+        rows = ", ".join(f"{c.name}: rows {c.start}-{c.stop - 1}" for c in r.cycles)
+        return f"{len(r.cycles)} thermal cycle(s): {rows}"
+    sizes = [len(c) for c in r.cycles]
+    usual = median(sizes)
+    few = count_short(r.cycles)
+    short = f"; {few} have fewer than {MIN_ROWS} rows and are judged with the one before" * bool(few)
+    return (
+        f"{len(sizes)} thermal cycles of {min(sizes)} to {max(sizes)} rows (median {usual:g} rows, "
+        f"{usual * r.sampling_interval / 3600:.2g} h){short}. --json and the page list them all."
+    )
 
 
 def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:

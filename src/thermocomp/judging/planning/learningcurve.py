@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thermocomp.core.arrays import BoolArray
+from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError
 from thermocomp.judging.budget import SHARE, WORTH, unseen_rms
 from thermocomp.judging.choice import Progress
-from thermocomp.judging.metrics import rms
 from thermocomp.judging.pieces import work_through
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.samples import Samples
@@ -30,15 +29,15 @@ class Point(NamedTuple):
     learned: int  #: number of training cycles
     speeds: int  #: number of different speeds in the training cycles, 0 if none was recorded
     unseen: int  #: index of the judged block
-    rms: float  #: mean over the targets [um]; nan: the model could not be fitted
+    rms: tuple[float, ...]  #: of each target [um]; empty: the model could not be fitted
 
 
 class Level(NamedTuple):
     """All models trained on the same number of cycles or speeds."""
 
     learned: int  #: number of training cycles, or speeds
-    rms: float  #: mean over the unseen blocks [um]
-    error: float  #: standard error of this mean over the blocks [um]; nan with a single block
+    rms: float  #: over all unseen rows, as in `compare`, mean over the targets [um]
+    error: float  #: standard error of it, from leaving out each block in turn [um]; nan with a single block
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +47,15 @@ class LearningCurve:
     Parameters
     ----------
     none : float
-        RMS without compensation, mean over blocks and targets [um].
+        RMS without compensation over all unseen rows, mean over the targets [um].
+    rows : ndarray of shape (n_blocks, n_targets)
+        Number of judged rows of each block.
     """
 
     model: str
     points: tuple[Point, ...]
     none: float
+    rows: FloatArray
 
     def by_cycles(self) -> tuple[Level, ...]:
         """Return the error for each number of training cycles."""
@@ -66,11 +68,11 @@ class LearningCurve:
     def _levels(self, of: Sequence[int]) -> tuple[Level, ...]:
         found = []
         for number in sorted(set(of)):
-            mine = [p for p, n in zip(self.points, of, strict=True) if n == number and np.isfinite(p.rms)]
-            blocks = [float(np.mean([p.rms for p in mine if p.unseen == b])) for b in sorted({p.unseen for p in mine})]
+            mine = [p for p, n in zip(self.points, of, strict=True) if n == number and p.rms]
+            blocks = sorted({p.unseen for p in mine})
             if blocks:
-                spread = float(np.std(blocks, ddof=1) / np.sqrt(len(blocks))) if len(blocks) > 1 else float("nan")
-                found.append(Level(number, float(np.mean(blocks)), spread))
+                squares = [np.mean([np.square(p.rms) for p in mine if p.unseen == b], axis=0) for b in blocks]
+                found.append(Level(number, *_pool(np.array(squares), self.rows[blocks])))
         return tuple(found)
 
     @property
@@ -135,10 +137,30 @@ def learning_curve(
         progress(f"{model} from {len(own)} cycle(s)")
         errors += [found] if isinstance(found, str) else []
         speeds = _n_speeds(samples, np.any([blocks[k] for k in own], axis=0))
-        points.append(Point(len(own), speeds, unseen, float("nan") if isinstance(found, str) else found))
+        points.append(Point(len(own), speeds, unseen, () if isinstance(found, str) else found))
     if len(errors) == len(points):
         raise FitError(f"no learning curve of {model}: {errors[0]}")
-    return LearningCurve(model, tuple(points), float(np.mean([_none(samples, b) for b in blocks])))
+    rows = np.array([np.isfinite(samples.deviations[b]).sum(axis=0) for b in blocks], dtype=np.float64)
+    none = np.array([np.nansum(np.square(samples.deviations[b]), axis=0) for b in blocks]) / np.maximum(rows, 1)
+    return LearningCurve(model, tuple(points), _pool(none, rows)[0], rows)
+
+
+def _pool(squares: FloatArray, rows: FloatArray) -> tuple[float, float]:
+    """Return the RMS over all rows, mean over the targets, and its standard error from leaving out each block.
+
+    Parameters
+    ----------
+    squares, rows : ndarray of shape (n_blocks, n_targets)
+        Mean square of each block [um^2], and its number of rows.
+    """
+    total = np.where(rows > 0, rows * squares, 0.0)
+
+    def pooled(own: BoolArray) -> float:
+        return float(np.sqrt(total[own].sum(axis=0) / np.maximum(rows[own].sum(axis=0), 1)).mean())
+
+    n = len(rows)
+    parts = [pooled(np.arange(n) != k) for k in range(n)] if n > 1 else [np.nan]
+    return pooled(np.ones(n, np.bool_)), float(np.std(parts) * np.sqrt(n - 1)) if n > 1 else float("nan")
 
 
 def n_pieces(judging: Judging) -> int:
@@ -152,15 +174,12 @@ def _sizes(blocks: int) -> list[int]:
     return sorted({round(x) for x in np.linspace(1, blocks - 1, min(MOST_SIZES, blocks - 1))})
 
 
-def _judged(samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]) -> float | str:
+def _judged(
+    samples: Samples, blocks: Sequence[BoolArray], model: str, piece: tuple[int, list[int]]
+) -> tuple[float, ...] | str:
     unseen, own = piece
     learn = np.any([blocks[k] for k in own], axis=0)
-    return float(np.mean(unseen_rms(samples, model, learn, blocks[unseen])))
-
-
-def _none(samples: Samples, rows: BoolArray) -> float:
-    of = [y[np.isfinite(y)] for y in samples.deviations[rows].T]
-    return float(np.mean([rms(y, np.zeros(len(y))) for y in of if y.size]))
+    return tuple(unseen_rms(samples, model, learn, blocks[unseen]).tolist())
 
 
 def _n_speeds(samples: Samples, rows: BoolArray) -> int:

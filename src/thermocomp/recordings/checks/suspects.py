@@ -106,16 +106,19 @@ def zeros(recording: Recording, signals: Sequence[Signal]) -> Iterator[Finding]:
     """Yield findings on displacements and tilts with an offset at the start: continued recording, or probe not zeroed.
 
     `thermocomp.recordings.starts.is_far` judges it, as for a model. This is a warning: the numbers are valid, but
-    models are relative to zero. So is a spindle that turns in the first row if a displacement has moved by then.
+    models are relative to zero. So is a spindle that turns in the first row if a displacement has moved by then;
+    otherwise it is only reported.
     """
     zeroing = find_zeroing(recording)
     moved = [s.channel.name for s in signals if abs(level(recording, s.channel.name, zeroing)) > NEAR]
-    if moved and turns(recording, zeroing):
+    if signals and turns(recording, zeroing):
+        told = f", where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved" * bool(moved)
         text = (
-            f"turns in the first row, where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved: "
-            "the zero was not taken at rest; record from the standstill on, or state what went before with --start"
+            f"turns in the first row{told}: unless it was started at that moment, the zero was not taken at rest; "
+            "record from the standstill on, or state what went before with --start"
         )
-        yield Finding("warning", zeroing.speed, "turning start", text, row=0)
+        severity: Severity = "warning" if moved else "info"
+        yield Finding(severity, zeroing.speed, "turning start", text, row=0)
     for s in signals:
         if len(s.x) >= 3 and np.ptp(s.x) and is_far(recording, s.channel.name, zeroing):
             unit, start = s.channel.unit, level(recording, s.channel.name, zeroing)

@@ -133,7 +133,8 @@ class ReadOptions:
     skip : tuple of int or pair of int
         Lines or rows to be skipped (1-based), as in error messages; a pair is a range that includes both ends.
     sheet : str
-        Sheet of a workbook; empty: the only sheet, or the only one with a table that has a time.
+        Sheet of a workbook, group of a TDMS or HDF5 file, variable of a MAT file; empty: the only one, or the only one
+        with a table that has a time.
     """
 
     delimiter: str = ""

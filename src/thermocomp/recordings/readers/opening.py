@@ -11,13 +11,16 @@ from pydantic import ValidationError
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.recordings.readers.cellunits import find_units
 from thermocomp.recordings.readers.described import name_channels
+from thermocomp.recordings.readers.hdf5 import open_hdf5
 from thermocomp.recordings.readers.labelled import open_text
 from thermocomp.recordings.readers.limits import FileLimits, check_file
 from thermocomp.recordings.readers.mapping import ADAPTER, Mapping, ReadOptions
+from thermocomp.recordings.readers.matlab import open_matlab
 from thermocomp.recordings.readers.mtconnect import open_mtconnect
 from thermocomp.recordings.readers.parquet import open_parquet
 from thermocomp.recordings.readers.pivoting import pivot
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.readers.tdms import open_tdms
 from thermocomp.recordings.readers.workbook import open_workbook
 
 _TEXTS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm")
@@ -28,6 +31,9 @@ _OPEN = {
     ".ods": open_workbook,
     ".parquet": open_parquet,
     ".xml": open_mtconnect,
+    ".tdms": open_tdms,
+    ".mat": open_matlab,
+    **dict.fromkeys((".h5", ".hdf5", ".hdf"), open_hdf5),
 }
 
 
