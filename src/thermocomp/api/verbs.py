@@ -158,8 +158,8 @@ def compare(
             jobs=jobs,
             progress=progress,
         )
-    if not robustness:
-        found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
+    measured = (a.with_uncertainty(ready.tests) for a in found.assessments)
+    found = replace(found, assessments=tuple(a if robustness else _untried(a) for a in measured))
     write = partial(
         studies.fit,
         ready.samples,
@@ -380,4 +380,5 @@ def assess(
         probings=Probings.of(probing),
         progress=progress,
     )
-    return Assessed(judged, tuple(tests), tuple(trouble))
+    measured = tuple(a.with_uncertainty(tests) for a in judged.assessments)
+    return Assessed(replace(judged, assessments=measured), tuple(tests), tuple(trouble))

@@ -18,7 +18,9 @@ from thermocomp.judging.probing import Probed
 from thermocomp.judging.recommend import Recommendation
 from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.splits import Judging
+from thermocomp.judging.uncertainty import FigureUncertainty, find_uncertainty
 from thermocomp.models.methods import deployable
+from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 
 
@@ -99,6 +101,8 @@ class Assessment:
         Name of the band; empty if no row has one.
     probed : Probed or None
         Effect of probings; None: the model ran without probings.
+    uncertainty : FigureUncertainty or None
+        Measurement uncertainty of RMS and largest error; None: the recordings state no contribution.
     """
 
     model: str
@@ -127,6 +131,14 @@ class Assessment:
     half_widths: FloatArray | None = None
     band: str = ""
     probed: Probed | None = None
+    uncertainty: FigureUncertainty | None = None
+
+    def with_uncertainty(self, recordings: Sequence[Recording]) -> "Assessment":
+        """Return the assessment with the measurement uncertainty that the recordings state for their displacements."""
+        if self.failure or self.verdict.unit != "um":
+            return self
+        found = find_uncertainty(self.target, self.measured, self.predicted, self.test, recordings)
+        return replace(self, uncertainty=found)
 
     @property
     def coverage(self) -> float:

@@ -13,7 +13,7 @@ from thermocomp.judging.choice import Choice
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.report import contributions, figures, selections
+from thermocomp.report import contributions, declared, figures, selections
 from thermocomp.report.bands import describe_coverage
 from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um, laid_out
@@ -100,6 +100,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     pages.filters["um"] = in_um
+    pages.filters["plus_minus"] = declared.plus_minus
     pages.filters["hours"] = lambda value: f"{value:.1f}"
     pages.filters["laid_out"] = laid_out
     return pages

@@ -15,6 +15,7 @@ from thermocomp.judging.inuse import WEIGHTS
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
+from thermocomp.report import declared
 from thermocomp.report.layout import Column
 
 #: maximum number of values of a remedy shown
@@ -51,6 +52,7 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
             }
             for f in found
         ],
+        **declared.recording(r),
     }
 
 
@@ -130,6 +132,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
         "first_turned_away": a.turned_away,
         **_band(a),
         **_probed(a),
+        **declared.content(a),
     }
     if a.robustness is not None:
         r = a.robustness
