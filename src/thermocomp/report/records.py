@@ -130,9 +130,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
         "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
         "readings_turned_away": a.rejected,
         "first_turned_away": a.turned_away,
-        **_band(a),
-        **_probed(a),
-        **declared.content(a),
+        **(_band(a) | _probed(a) | declared.content(a)),
     }
     if a.robustness is not None:
         r = a.robustness
