@@ -19,7 +19,7 @@ from thermocomp.judging import assessing, do_no_harm
 from thermocomp.judging import compare as comparing
 from thermocomp.judging import study as studies
 from thermocomp.judging.probing import Probings
-from thermocomp.judging.results import Assessment, Rules
+from thermocomp.judging.results import Assessment, Rules, with_uncertainty
 from thermocomp.judging.sharing import shared_among
 from thermocomp.recordings.readers.mapping import Mapping
 
@@ -158,7 +158,7 @@ def compare(
             jobs=jobs,
             progress=progress,
         )
-    measured = (a.with_uncertainty(ready.tests) for a in found.assessments)
+    measured = with_uncertainty(found.assessments, ready.tests)
     found = replace(found, assessments=tuple(a if robustness else _untried(a) for a in measured))
     write = partial(
         studies.fit,
@@ -380,5 +380,5 @@ def assess(
         probings=Probings.of(probing),
         progress=progress,
     )
-    measured = tuple(a.with_uncertainty(tests) for a in judged.assessments)
+    measured = with_uncertainty(judged.assessments, tests)
     return Assessed(replace(judged, assessments=measured), tuple(tests), tuple(trouble))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from thermocomp.judging.probing import Probed
 from thermocomp.judging.recommend import Recommendation
 from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.splits import Judging
-from thermocomp.judging.uncertainty import FigureUncertainty, find_uncertainty
+from thermocomp.judging.uncertainty import FigureUncertainty, find_scatter, find_uncertainty
 from thermocomp.models.methods import deployable
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
@@ -133,13 +134,6 @@ class Assessment:
     probed: Probed | None = None
     uncertainty: FigureUncertainty | None = None
 
-    def with_uncertainty(self, recordings: Sequence[Recording]) -> "Assessment":
-        """Return the assessment with the measurement uncertainty that the recordings state for their displacements."""
-        if self.failure or self.verdict.unit != "um":
-            return self
-        found = find_uncertainty(self.target, self.measured, self.predicted, self.test, recordings)
-        return replace(self, uncertainty=found)
-
     @property
     def coverage(self) -> float:
         """Fraction of the judged rows inside the band; nan without a band."""
@@ -245,6 +239,19 @@ class Assessment:
             f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training and are "
             "left out"
         )
+
+
+def with_uncertainty(found: Sequence[Assessment], recordings: Sequence[Recording]) -> tuple[Assessment, ...]:
+    """Return assessments with the measurement uncertainty that the recordings declare for their displacements."""
+    scatter = cache(find_scatter)
+    return tuple(
+        a
+        if a.failure or a.verdict.unit != "um"
+        else replace(
+            a, uncertainty=find_uncertainty(a.target, a.measured, a.predicted, a.test, recordings, scatter=scatter)
+        )
+        for a in found
+    )
 
 
 @dataclass(frozen=True)

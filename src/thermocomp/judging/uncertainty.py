@@ -17,7 +17,7 @@ U is 0.577 of it, which ISO/TR 230-9 rounds to 0.6.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,8 +60,21 @@ class FigureUncertainty:
         return float(K * math.hypot(*(u[place] for u in self.contributions.values())))
 
 
+def find_scatter(recording: Recording, target: str) -> float:
+    """Return the standard deviation of single readings, apart from their drift [um]; 0 for less than three rows."""
+    values = recording.values([recording.channel(target)])[:, 0]
+    alone = replace(noise_of(recording.time, values), inflation=1.0)  # without what neighbouring rows have in common
+    return float(np.nan_to_num(alone.of_mean(1.0)))
+
+
 def find_uncertainty(
-    target: str, measured: FloatArray, predicted: FloatArray, test: IntArray, recordings: Sequence[Recording]
+    target: str,
+    measured: FloatArray,
+    predicted: FloatArray,
+    test: IntArray,
+    recordings: Sequence[Recording],
+    *,
+    scatter: Callable[[Recording, str], float] = find_scatter,
 ) -> FigureUncertainty | None:
     """Return the measurement uncertainty of the figures of a target.
 
@@ -73,6 +86,8 @@ def find_uncertainty(
         Recording of each row.
     recordings : sequence of Recording
         They declare the contributions.
+    scatter : callable
+        `find_scatter`, or the same with a cache.
 
     Returns
     -------
@@ -85,7 +100,7 @@ def find_uncertainty(
         return None
     declared = [r.declared for r in tests]
     known = [d.uncertainty.repeatability_um for d in declared]
-    scatter = [_scatter(r, target) if s is None else s for s, r in zip(known, tests, strict=True)]
+    spread = [scatter(r, target) if s is None else s for s, r in zip(known, tests, strict=True)]
     errors = (measured, measured - predicted)
 
     def rows(values: Sequence[float]) -> FloatArray:
@@ -97,12 +112,12 @@ def find_uncertainty(
     for name, values in _by_name([_within_range(d) for d in declared]).items():
         u = rows(values)
         found[name] = np.tile([np.sqrt(np.mean(u**2)), u.max()], (2, 1))
-    zeros = [_of_course(errors, np.where(place == k, s, 0.0)) for k, s in enumerate(scatter)]
+    zeros = [_of_course(errors, np.where(place == k, s, 0.0)) for k, s in enumerate(spread)]
     found["zero"] = np.sqrt(np.sum(np.square(zeros), axis=0))
-    found["repeatability"] = np.stack([_of_noise(e, rows(scatter)) for e in errors])
+    found["repeatability"] = np.stack([_of_noise(e, rows(spread)) for e in errors])
     return FigureUncertainty(
         contributions=found,
-        repeatability=max((s for s, k in zip(scatter, known, strict=True) if k is None), default=math.nan),
+        repeatability=max((s for s, k in zip(spread, known, strict=True) if k is None), default=math.nan),
         absent=tuple(dict.fromkeys(name for d in declared for name in _absent(d))),
     )
 
@@ -139,13 +154,6 @@ def _absent(d: Declared) -> list[str]:
 def _by_name(tests: Sequence[dict[str, float]]) -> dict[str, list[float]]:
     """Return the values of each contribution in every test; 0 where only other tests state it."""
     return {name: [t.get(name, 0.0) for t in tests] for t in tests for name in t}
-
-
-def _scatter(recording: Recording, target: str) -> float:
-    """Return the standard deviation of single readings, apart from their drift [um]; 0 for less than three rows."""
-    values = recording.values([recording.channel(target)])[:, 0]
-    alone = replace(noise_of(recording.time, values), inflation=1.0)  # without what neighbouring rows have in common
-    return float(np.nan_to_num(alone.of_mean(1.0)))
 
 
 def _figures(error: FloatArray) -> FloatArray:

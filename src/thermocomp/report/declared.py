@@ -54,7 +54,8 @@ def plus_minus(found: FigureUncertainty | None, figure: str, none: bool = False)
 
 def describe(found: FigureUncertainty) -> str:
     """Return what an uncertainty contains, and what it does not, as text."""
-    own = f" (repeatability {found.repeatability:.2g} um, the scatter of the rows)" if found.repeatability > 0 else ""
+    own = f", with a repeatability of {found.repeatability:.2g} um from the scatter of the rows"
+    own = own if found.repeatability > 0 else ""
     left = f" Not stated, so not contained: {', '.join(found.absent)}." if found.absent else ""
     return f"±: expanded measurement uncertainty (k = 2, ISO/TR 230-9){own}.{left}"
 
