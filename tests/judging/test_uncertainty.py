@@ -61,6 +61,16 @@ def test_a_constant_counts_by_the_second_order_where_the_error_is_zero_on_averag
     found = find_uncertainty("z_um", measured, np.zeros(2), np.zeros(2, np.intp), tests)
     assert found is not None
     assert found.contributions["zero"][0] == pytest.approx([0.236, 1.0], rel=0.01)  # sqrt(5) - 2
+    # 2 - sqrt(4 - 1) = 0.268 by which the noise has raised the RMS, and 1 / sqrt(2)
+    assert found.contributions["repeatability"][0] == pytest.approx([0.756, 1.0], rel=0.01)
+
+
+def test_the_larger_of_both_changes_counts() -> None:
+    measured = np.array([-3.0, 1.0])
+    tests = [recording(measured, Declared(uncertainty=MeasuringUncertainty(repeatability_um=1.0)))]
+    found = find_uncertainty("z_um", measured, np.zeros(2), np.zeros(2, np.intp), tests)
+    assert found is not None
+    assert found.contributions["zero"][0] == pytest.approx([0.592, 1.0], rel=0.01)  # sqrt(8) - sqrt(5), not - 2
 
 
 def test_the_zeros_of_two_tests_are_independent() -> None:

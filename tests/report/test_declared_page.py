@@ -68,7 +68,7 @@ def test_compare_and_assess_state_them(folder: Path, out: Callable[..., str]) ->
     assert WORKPIECE in full
     assert re.search(r"expanded \(k = 2\) +│ +0\.80 │ +0\.80 │ +0\.80 │ +0\.80 │", full)
     assert full.count(" ± 0.80 │") == 4
-    assert words(folder / "assessed.html").count(" ± 0.80 ") == 4
+    assert words(folder / "assessed.html").count(" ± 0.80 ") == 6  # in the verdict, too
     (found, *_) = json.loads(out("assess", "model.json", "second.csv", "--json"))["results"]
     assert found["uncertainty"]["standard"]["probe"] == pytest.approx(
         dict.fromkeys(found["uncertainty"]["expanded"], 0.4)

@@ -1,5 +1,6 @@
 """Header data, workpiece and measurement uncertainty of tests, as text, as a table and as JSON."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,6 +51,12 @@ def plus_minus(found: FigureUncertainty | None, figure: str, none: bool = False)
     """Return the expanded uncertainty of a figure as text behind the figure; empty if there is none."""
     value = None if found is None else found.expanded(figure, none=none)
     return "" if value is None else f" ± {value:.2f}"
+
+
+def measured(a: Assessment, metric: str, *, none: bool = False) -> str:
+    """Return a figure of a model, or without it, as text with its expanded uncertainty."""
+    value = a.none_metric(metric) if none else a.metric(metric)
+    return f"{value:.2f}{plus_minus(a.uncertainty, metric, none)}" if math.isfinite(value) else ""
 
 
 def describe(found: FigureUncertainty) -> str:

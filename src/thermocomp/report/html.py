@@ -100,7 +100,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     pages.filters["um"] = in_um
-    pages.filters["plus_minus"] = declared.plus_minus
+    pages.filters["plus_minus"] = lambda *given: declared.plus_minus(*given).replace(" ", "\N{NO-BREAK SPACE}")
     pages.filters["hours"] = lambda value: f"{value:.1f}"
     pages.filters["laid_out"] = laid_out
     return pages

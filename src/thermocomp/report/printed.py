@@ -15,6 +15,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 from thermocomp.report import declared, records
 from thermocomp.report.bands import describe_bands
+from thermocomp.report.declared import measured
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Item, Layout, PrintedLine, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
@@ -44,7 +45,7 @@ def comparison(found: Comparison, recordings: Sequence[Recording] = ()) -> Itera
             yield PrintedLine(f" {describe_choice(found, target)}")
         else:
             yield PrintedLine(
-                f", {best.metric('rms'):.2f} um RMS instead of {best.none_metric('rms'):.2f} um "
+                f", {measured(best, 'rms')} um RMS instead of {measured(best, 'rms', none=True)} um "
                 f"({best.metric('reduction'):.0f} % less): {best.reason}",
                 Toned(f"{target}: {best.model}", "chosen"),
                 whole=True,
@@ -188,10 +189,10 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
     banded = any(a.band for a in assessments)
     for mine in _by_target(assessments):
         sections.append(len(rows))
-        none = (_measured(mine[0], m, none=True) for m in metrics.values())
+        none = (measured(mine[0], m, none=True) for m in metrics.values())
         rows.append((Toned(f"{mine[0].target}, none", "strong"), *none, *[""] * (5 if banded else 3)))
         for a in mine:
-            figures = (_measured(a, m) for m in metrics.values())
+            figures = (measured(a, m) for m in metrics.values())
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
             held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
             sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))
@@ -209,13 +210,6 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
         tones=dict.fromkeys(sections, "none"),
         sections=frozenset(sections),
     )
-
-
-def _measured(a: Assessment, metric: str, *, none: bool = False) -> str | float:
-    """Return a figure, with its measurement uncertainty if that is known."""
-    value = a.none_metric(metric) if none else a.metric(metric)
-    told = declared.plus_minus(a.uncertainty, metric, none)
-    return f"{value:.2f}{told}" if told else value
 
 
 def _band_words(assessments: Sequence[Assessment]) -> str:
