@@ -53,7 +53,7 @@ def words(page: Path) -> str:
 def test_compare_and_assess_state_them(folder: Path, out: Callable[..., str]) -> None:
     study = ("--target", "z_um", "--jobs", "1")
     short = out("compare", "first.csv", *study, "--models", "ols", "-o", "page.html")
-    assert "Measurement uncertainty of the RMS (k = 2) [um]: z_um ± 0.80 (largest ± 0.80)." in short
+    assert "Measurement uncertainty (k = 2) [um]: RMS ± 0.80, largest ± 0.80." in short
     page = words(folder / "page.html")
     result = tc.compare(["first.csv"], "z_um", "ols", robustness=False, jobs=1).comparison.overall()[0]
     figures = [result.none_metric("rms"), result.none_metric("max_abs"), result.metric("rms"), result.metric("max_abs")]
@@ -78,7 +78,7 @@ def test_compare_and_assess_state_them(folder: Path, out: Callable[..., str]) ->
 def test_what_is_not_declared_is_not_there(folder: Path, out: Callable[..., str]) -> None:
     short = out("compare", "bare.csv", "--target", "z_um", "--jobs", "1", "--models", "ols", "-o", "page.html")
     page = words(folder / "page.html")
-    assert [word for word in ("uncertainty of", "±", "Workpiece", "Test:") if word in short or word in page] == []
+    assert [word for word in ("ncertainty (k", "±", "Workpiece", "Test:") if word in short or word in page] == []
     (found,) = json.loads(out("check", "bare.csv", "--json"))["recordings"]
     assert not {"test", "workpiece"} & set(found)
 

@@ -20,7 +20,7 @@ def _date(found: Any) -> Any:
 
 @dataclass(frozen=True)
 class HeaderData:
-    """Table ``[test]``: who measured what, where, when and with what, as text; empty entries are not stated."""
+    """Table ``[test]``: header data of a test, as text; empty entries are not stated."""
 
     machine: str = ""
     serial: str = ""
@@ -39,7 +39,7 @@ class HeaderData:
 
 @dataclass(frozen=True)
 class MeasuringUncertainty:
-    """Table ``[uncertainty]``: what the displacements of a test are uncertain by; None: not stated.
+    """Table ``[uncertainty]``: contributions to the measurement uncertainty of displacements; None: not stated.
 
     Parameters
     ----------

@@ -80,13 +80,14 @@ def budget(a: Assessment) -> Layout | None:
 
 
 def answer(rows: Sequence[Assessment]) -> list[PrintedLine]:
-    """Return a line with the expanded uncertainties of models."""
-    told = [
-        f"{a.target}{plus_minus(u, 'rms')} (largest{plus_minus(u, 'max_abs')})"
-        for a in rows
-        if (u := a.uncertainty) is not None
-    ]
-    return [PrintedLine(f"Measurement uncertainty of the RMS (k = 2) [um]: {', '.join(told)}.")] if told else []
+    """Return a line with the expanded uncertainties of models: the smallest and the largest of all targets."""
+    told = []
+    for word, figure in (("RMS", "rms"), ("largest", "max_abs")):
+        values = [a.uncertainty.expanded(figure) or 0.0 for a in rows if a.uncertainty is not None]
+        if not values:
+            return []
+        told.append(f"{word} ± {' to '.join(dict.fromkeys(f'{v:.2f}' for v in (min(values), max(values))))}")
+    return [PrintedLine(f"Measurement uncertainty (k = 2) [um]: {', '.join(told)}.")]
 
 
 def content(a: Assessment) -> dict[str, Any]:
