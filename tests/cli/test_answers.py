@@ -180,7 +180,7 @@ def test_a_part_of_an_answer_counts_its_other_warnings(
         made = CommandAnswer(head="Done.", warnings=warnings)
         CommandFace(part=True).answer(dict, lambda made=made: made, lambda: None)  # type: ignore[misc]
     first, second = capsys.readouterr().out.split("Done.")[1:]
-    assert first.split() == ["but", "a"]
+    assert first.split() == ["Warning:", "a"]
     assert " ".join(second.split()).endswith("word ... (2 more: --details)")
     check_size(second)
 

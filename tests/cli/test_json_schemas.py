@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from thermocomp.live.journal.journal import Journal, JournalLimits
 from thermocomp.live.journal.journalrows import AlarmRow, ReadingRow, StartRow, TargetRow
 from thermocomp.papers import studies
 from thermocomp.papers.study import Claim, Study, StudyTable
+from thermocomp.recordings.declared import Declared, ExpandingBody, HeaderData, Workpiece
 from thermocomp.recordings.readers import recordings
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -95,7 +97,9 @@ def held(name: str, capsys: pytest.CaptureFixture[str], *arguments: str) -> dict
 @pytest.fixture
 def drift(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)
-    recordings.write(small_machine(), tmp_path / "drift.csv")
+    body, workpiece = ExpandingBody(250.0, 11.5, 0.4), Workpiece(300.0, 23.0, "t1_C")
+    declared = Declared(HeaderData(machine="VMC 3"), expansion={"fixture": body}, workpiece=workpiece)
+    recordings.write(replace(small_machine(), declared=declared), tmp_path / "drift.csv")
     return "drift.csv"
 
 
@@ -116,7 +120,7 @@ def test_the_check_finds_what_is_wrong() -> None:
 
 def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
     study = ("--target", "z_um", "--jobs", "1")
-    assert held("compare", capsys, drift, *study, "--models", "ols", "mra")["results"]
+    assert held("compare", capsys, drift, *study, "--models", "ols", "mra")["results"][0]["uncertainty"]
     assert held("select", capsys, drift, *study, "--method", "partial-f")["choices"]
     assert held("fit", capsys, drift, *study, "--model", "ols", "-o", "model.json")["models"]
     assert held("plan", capsys, drift, *study)["curve"]["cycles"]
@@ -131,7 +135,9 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
 
 
 def test_recordings(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert held("check", capsys, drift, "-o", "page.html")["page"] == "page.html"
+    checked = held("check", capsys, drift, "-o", "page.html")
+    assert checked["page"] == "page.html"
+    assert {"test", "workpiece"} <= set(checked["recordings"][0])
     assert held("simulate", capsys, "demo", "-o", "demo.parquet")["recordings"]
     assert held("join", capsys, drift, drift, "--offset", "30", "-o", "joined.csv")["clocks"][0]["given"]
     assert held("simulate", capsys, "--list")["experiments"]

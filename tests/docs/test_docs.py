@@ -21,6 +21,7 @@ from numpydoc.validate import validate  # type: ignore[import-untyped]
 import thermocomp
 from thermocomp.cli.app import app
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
+from thermocomp.recordings.declared import ExpandingBody, HeaderData, MeasuringUncertainty, Workpiece
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ColumnMap, CycleRule, Mapping, ReadOptions, TimeColumn, read_mapping
 from thermocomp.recordings.readers.recordings import read
@@ -51,6 +52,8 @@ NOUNS = {
 VERBS = ["read", "select", "fit", "freeze", "assess", "compare"]
 VERBS += ["synthesize", "compensate", "revise", "export", "report", "serve"]
 TABLES = {"time": TimeColumn, "columns.NAME": ColumnMap, "read": ReadOptions, "cycles": CycleRule, "limits": FileLimits}
+TABLES |= {"test": HeaderData, "uncertainty": MeasuringUncertainty}
+TABLES |= {"expansion.NAME": ExpandingBody, "workpiece": Workpiece}
 STEPS = (Cut, Shift, Rezero, Swap, Resample)
 # Written by Sphinx itself, or not a page.
 _MADE = ("_build", "_templates", "auto_examples", "auto_papers", "papers", "reference", "tutorial")

@@ -19,7 +19,7 @@ from thermocomp.judging import assessing, do_no_harm
 from thermocomp.judging import compare as comparing
 from thermocomp.judging import study as studies
 from thermocomp.judging.probing import Probings
-from thermocomp.judging.results import Assessment, Rules
+from thermocomp.judging.results import Assessment, Rules, with_uncertainty
 from thermocomp.judging.sharing import shared_among
 from thermocomp.recordings.readers.mapping import Mapping
 
@@ -158,8 +158,8 @@ def compare(
             jobs=jobs,
             progress=progress,
         )
-    if not robustness:
-        found = replace(found, assessments=tuple(_untried(a) for a in found.assessments))
+    measured = with_uncertainty(found.assessments, ready.tests)
+    found = replace(found, assessments=tuple(a if robustness else _untried(a) for a in measured))
     write = partial(
         studies.fit,
         ready.samples,
@@ -380,4 +380,5 @@ def assess(
         probings=Probings.of(probing),
         progress=progress,
     )
-    return Assessed(judged, tuple(tests), tuple(trouble))
+    measured = with_uncertainty(judged.assessments, tests)
+    return Assessed(replace(judged, assessments=measured), tuple(tests), tuple(trouble))

@@ -27,7 +27,7 @@ def compare(found: Compared, face: CommandFace) -> int:
     face.answer(
         found.to_dict,
         lambda: judged.comparison(found.comparison, face.files, _following(found, face)),
-        lambda: print_items(printed.comparison(found.comparison), console),
+        lambda: print_items(printed.comparison(found.comparison, found.recordings), console),
     )
     if found.comparison.left:
         return STOPPED

@@ -141,7 +141,8 @@ class CommandFace:
             value = {**self.given, **more}.get(option, p.default)
             if is_group(p.annotation):
                 for f in fields(p.annotation):
-                    if is_group(type(value)) and (own := getattr(value, f.name)) != getattr(p.annotation(), f.name):
+                    usual = getattr(p.annotation(), f.name)  # this command may have fewer of the options
+                    if is_group(type(value)) and (own := getattr(value, f.name, usual)) != usual:
                         found += _typed(_name_of(f.name, None), own)
             elif p.kind is p.POSITIONAL_ONLY:
                 found += map(str, value if isinstance(value, list) else [] if value is None else [value])

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,9 @@ from thermocomp.judging.probing import Probed
 from thermocomp.judging.recommend import Recommendation
 from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.splits import Judging
+from thermocomp.judging.uncertainty import FigureUncertainty, find_scatter, find_uncertainty
 from thermocomp.models.methods import deployable
+from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 
 
@@ -100,6 +103,8 @@ class Assessment:
         Name of the band; empty if no row has one.
     probed : Probed or None
         Effect of probings; None: the model ran without probings.
+    uncertainty : FigureUncertainty or None
+        Measurement uncertainty of RMS and largest error; None: the recordings state no contribution.
     """
 
     model: str
@@ -128,6 +133,7 @@ class Assessment:
     half_widths: FloatArray | None = None
     band: str = ""
     probed: Probed | None = None
+    uncertainty: FigureUncertainty | None = None
 
     @property
     def coverage(self) -> float:
@@ -236,6 +242,19 @@ class Assessment:
             f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training and are "
             "left out"
         )
+
+
+def with_uncertainty(found: Sequence[Assessment], recordings: Sequence[Recording]) -> tuple[Assessment, ...]:
+    """Return assessments with the measurement uncertainty that the recordings declare for their displacements."""
+    scatter = cache(find_scatter)
+    return tuple(
+        a
+        if a.failure or a.verdict.unit != "um"
+        else replace(
+            a, uncertainty=find_uncertainty(a.target, a.measured, a.predicted, a.test, recordings, scatter=scatter)
+        )
+        for a in found
+    )
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,7 @@ def join_two(first: Recording, second: Recording, offset: float | None = None) -
         notes=(*first.notes, *second.notes, str(told), *told.notes),
         compensation=words.pop() if len(words) == 1 else "unknown" if words else "",
         clocks="; ".join(filter(None, (first.clocks, second.clocks, str(told)))),
+        declared=first.declared.over(second.declared),
     )
     return joined, told
 

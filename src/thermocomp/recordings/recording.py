@@ -16,6 +16,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError, tell_nearest
 from thermocomp.core.machine import Channel
 from thermocomp.recordings.cycles import Cycle
+from thermocomp.recordings.declared import Declared
 from thermocomp.recordings.frames import parts_of
 
 AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
@@ -59,6 +60,8 @@ class Recording:
         states it.
     clocks : str
         How the clocks of several loggers were brought together, as text; empty for a single logger.
+    declared : Declared
+        Header data, measurement uncertainty and workpiece, as declared by a mapping.
 
     Examples
     --------
@@ -87,6 +90,7 @@ class Recording:
     compensation: str = ""
     time_unit: str = "s"
     clocks: str = ""
+    declared: Declared = Declared()
 
     def __post_init__(self) -> None:
         if len(self.time) != len(self.table):

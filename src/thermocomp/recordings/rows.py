@@ -11,6 +11,7 @@ import pandas as pd
 from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.exceptions import InputError, tell_nearest
 from thermocomp.core.machine import Channel
+from thermocomp.recordings.declared import Declared
 
 #: a time as seconds since the first row of the file [s], or as a timestamp
 Instant = float | datetime | str
@@ -55,6 +56,8 @@ class Rows:
         Unit that the file states for its times, see `Recording`.
     clocks : str
         How the clocks of several loggers were brought together, see `Recording`.
+    declared : Declared
+        What the mapping declares about the test.
     """
 
     source: str
@@ -75,6 +78,7 @@ class Rows:
     compensation: str = ""
     time_unit: str = "s"
     clocks: str = ""
+    declared: Declared = Declared()
 
     def kept(self, rows: IntArray) -> "Rows":
         """Return only the rows with the given indices."""

@@ -14,6 +14,7 @@ from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.splits import Judging
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import faults, probings
+from thermocomp.report.declared import measured
 from thermocomp.report.html import draw_measured, draw_runs, page
 from thermocomp.report.layout import laid_out
 from thermocomp.report.sections import Section
@@ -45,7 +46,7 @@ def _verdict(a: Assessment, stated: Mapping[str, float]) -> str:
     if a.failure:
         return f"{a.target}: {a.reason}"
     known = f" ({stated[a.target]:.2f} um stated in the model file)" if a.target in stated else ""
-    return f"{a.target}: {a.word}, {a.metric('rms'):.2f} um RMS{known} instead of {a.none_metric('rms'):.2f} um"
+    return f"{a.target}: {a.word}, {measured(a, 'rms')} um RMS{known} instead of {measured(a, 'rms', none=True)} um"
 
 
 def _fitted_badly(judged: Judged) -> Iterator[str]:

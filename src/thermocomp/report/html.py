@@ -15,7 +15,7 @@ from thermocomp.judging.choice import Choice
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.report import contributions, curves, figures, selections
+from thermocomp.report import contributions, curves, declared, figures, selections
 from thermocomp.report.bands import describe_coverage
 from thermocomp.report.drawing import Drawn
 from thermocomp.report.layout import in_um, laid_out
@@ -111,6 +111,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     pages.filters["um"] = in_um
+    pages.filters["plus_minus"] = lambda *given: declared.plus_minus(*given).replace(" ", "\N{NO-BREAK SPACE}")
     pages.filters["hours"] = lambda value: f"{value:.1f}"
     pages.filters["laid_out"] = laid_out
     pages.filters["live"] = _embed

@@ -11,7 +11,7 @@ from thermocomp.judging.faultlog import find_faults
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
-from thermocomp.report import summary
+from thermocomp.report import declared, summary
 from thermocomp.report.answer import CommandAnswer, in_unit, spares, spares_of
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
@@ -28,7 +28,11 @@ def comparison(told: Comparison, files: Sequence[object], following: Sequence[st
     return CommandAnswer(
         head=summary.verdict(told),
         table=_results(rows, "use"),
-        lines=[*_worst_cycle(rows), *_dear([a for a in best.values() if a is not None])],
+        lines=[
+            *declared.answer(rows),
+            *_worst_cycle(rows),
+            *_dear([a for a in best.values() if a is not None]),
+        ],
         warnings=[
             *stopped,
             *(f"{a.target}: no model may run yet; {a.model}: {a.reason}" for a in none),
@@ -77,7 +81,7 @@ def assess(
         head=f"On these recordings: {'; '.join(f'{word} for {_list(t)}' for word, t in words.items())}. "
         "RMS here, and on unseen data when fitted.",
         table=_results(rows, "model", {target: h.rms for target, h in fitted.items()}),
-        lines=[*_worst_cycle(rows), *_dear(rows)],
+        lines=[*declared.answer(rows), *_worst_cycle(rows), *_dear(rows)],
         warnings=[
             *(
                 f"{a.target}: {a.word}, {a.reason}"

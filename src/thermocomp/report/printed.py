@@ -14,8 +14,9 @@ from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
-from thermocomp.report import records
+from thermocomp.report import declared, records
 from thermocomp.report.bands import describe_bands
+from thermocomp.report.declared import measured
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Item, Layout, PrintedLine, Toned, laid_out, verdict
 from thermocomp.report.losses import describe_losses
@@ -28,12 +29,15 @@ _MOST_CYCLES, _WORST = 25, 12
 BUT, NOTE = Toned("but", "doubtful"), Toned("note", "soft")
 
 
-def comparison(found: Comparison) -> Iterator[Item]:
+def comparison(found: Comparison, recordings: Sequence[Recording] = ()) -> Iterator[Item]:
     """Yield the lines and tables about a comparison of methods on unseen blocks."""
+    yield from _declared(recordings)
     yield from _starts(found.starts)
     yield PrintedLine(f"Judged on: {found.judging.name}")
     yield _assessment_table(found.assessments)
     yield _cycle_table(found.assessments)
+    shown = [found.best(mine[0].target) or mine[0] for mine in _by_target(found.assessments)]
+    yield from filter(None, map(declared.budget, shown))
     for a in found.overall():
         if not a.accepted:
             yield PrintedLine(f" {a.model} for {a.target}: {a.reason}", verdict(a.word), whole=True)
@@ -44,7 +48,7 @@ def comparison(found: Comparison) -> Iterator[Item]:
             yield PrintedLine(f" {describe_choice(found, target)}")
         else:
             yield PrintedLine(
-                f", {best.metric('rms'):.2f} um RMS instead of {best.none_metric('rms'):.2f} um "
+                f", {measured(best, 'rms')} um RMS instead of {measured(best, 'rms', none=True)} um "
                 f"({best.metric('reduction'):.0f} % less): {best.reason}",
                 Toned(f"{target}: {best.model}", "chosen"),
                 whole=True,
@@ -96,6 +100,7 @@ def fit(fitted: Fitted) -> Iterator[Item]:
 def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     """Yield the lines and tables about models judged on recordings."""
     logs = find_faults(judged, recordings)
+    yield from _declared(recordings)
     yield from _starts(judged.starts)
     yield from (
         PrintedLine(f" {name}: {describe_offsets(off)}", BUT, whole=True) for name, off in judged.offsets.items()
@@ -105,6 +110,7 @@ def assess(judged: Judged, recordings: Sequence[Recording]) -> Iterator[Item]:
     yield from (PrintedLine(f" {line}", BUT, whole=True) for line in describe_held(judged, logs))
     yield _assessment_table(judged.assessments)
     yield _cycle_table(judged.assessments)
+    yield from filter(None, map(declared.budget, judged.overall()))
     yield _robustness(judged.overall())
     for a in judged.overall():
         if a.target in judged.stated and not a.failure:
@@ -145,6 +151,12 @@ def _starts(begins: Sequence[tuple[str, Start]]) -> Iterator[PrintedLine]:
     return (PrintedLine(f"Initial state of {start.told(name)}") for name, start in begins)
 
 
+def _declared(recordings: Sequence[Recording]) -> Iterator[PrintedLine]:
+    yield from map(PrintedLine, declared.header_lines(recordings))
+    pieces = (declared.recording(r).get("workpiece") for r in recordings)
+    yield from (PrintedLine(w["text"]) for w in pieces if w is not None)
+
+
 def _robustness(assessments: Sequence[Assessment]) -> Layout:
     columns = (
         Column("target", "target"),
@@ -180,10 +192,10 @@ def _assessment_table(assessments: Sequence[Assessment]) -> Layout:
     banded = any(a.band for a in assessments)
     for mine in _by_target(assessments):
         sections.append(len(rows))
-        none = (mine[0].none_metric(m) for m in metrics.values())
+        none = (measured(mine[0], m, none=True) for m in metrics.values())
         rows.append((Toned(f"{mine[0].target}, none", "strong"), *none, *[""] * (5 if banded else 3)))
         for a in mine:
-            figures = (a.metric(m) for m in metrics.values())
+            figures = (measured(a, m) for m in metrics.values())
             less = "" if a.failure else f"{a.metric('reduction'):.0f} %"
             held = (f"{100 * a.coverage:.0f} %" if a.band else "", a.half_width) if banded else ()
             sensors = "-".join(map(str, dict.fromkeys(a.n_sensors)))

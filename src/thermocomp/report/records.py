@@ -18,6 +18,7 @@ from thermocomp.judging.splits import MIN_ROWS
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
+from thermocomp.report import declared
 from thermocomp.report.layout import Column
 
 #: more thermal cycles are summarised
@@ -76,6 +77,7 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
             }
             for f in found
         ],
+        **declared.recording(r),
     }
 
 
@@ -153,8 +155,7 @@ def assessment(a: Assessment) -> dict[str, Any]:
         "limits": a.limits and {k: v for k, v in asdict(a.limits).items() if k != "reading_age"},
         "readings_turned_away": a.rejected,
         "first_turned_away": a.turned_away,
-        **_band(a),
-        **_probed(a),
+        **(_band(a) | _probed(a) | declared.content(a)),
     }
     if a.robustness is not None:
         r = a.robustness

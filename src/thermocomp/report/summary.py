@@ -15,7 +15,7 @@ from thermocomp.judging.robustness import Robustness
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.report import records
+from thermocomp.report import declared, records
 from thermocomp.report.running import describe_running
 
 #: ratio of the RMS of rows unlike the training to that of all rows above which they are a caution
@@ -38,6 +38,7 @@ def summarise(
     targets = list(dict.fromkeys(a.target for a in comparison.assessments))
     return {
         "judging": comparison.judging.name,
+        "headers": declared.header_lines(recordings),
         "verdict": verdict(comparison),
         "covered": None
         if samples is None
@@ -171,10 +172,13 @@ def _target(comparison: Comparison, target: str, samples: Samples | None) -> dic
     overall = [a for a in comparison.overall() if a.target == target]
     none = overall[0]
     best = comparison.best(target)
+    measured = best or next((a for a in overall if a.uncertainty is not None), none)
     cycles = [u.name for u in max((a.verdict.units for a in overall), key=len)]
     return {
         "name": target,
         "none": {m: none.none_metric(m) for m in SHOWN if m != "reduction"},
+        "uncertainty": measured.uncertainty,
+        "budget": declared.budget(measured),
         "rows": overall,
         "cycles": cycles,
         "per_cycle": [

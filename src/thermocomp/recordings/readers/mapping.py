@@ -18,6 +18,7 @@ from thermocomp.core.units import HOUSE_UNITS, Unit, find_unit
 from thermocomp.files.plaintext import strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
+from thermocomp.recordings.declared import Declared, ExpandingBody, HeaderData, MeasuringUncertainty, Workpiece
 from thermocomp.recordings.readers.limits import FileLimits
 
 #: a column by its heading or 1-based number
@@ -184,6 +185,8 @@ class Mapping:
         have been; empty: not specified. See `thermocomp.recordings.compensated`.
     clocks : str
         Written by ``thermocomp join``: how the clocks of the loggers were brought together.
+    test, uncertainty, expansion, workpiece
+        See `thermocomp.recordings.declared`.
     """
 
     time: TimeColumn = TimeColumn()
@@ -194,8 +197,13 @@ class Mapping:
     limits: FileLimits = FileLimits()
     compensation: Literal["", "off", "known", "unknown"] = ""
     clocks: str = ""
+    test: HeaderData = HeaderData()
+    uncertainty: MeasuringUncertainty = MeasuringUncertainty()
+    expansion: AbstractMapping[str, ExpandingBody] = field(default_factory=dict)
+    workpiece: Workpiece | None = None
 
     def __post_init__(self) -> None:
+        _ = self.declared  # checks the numbers
         if self.time.unit not in ("", "timestamp"):
             _unit_in("[time]", self.time.unit, "time")
         _check_start(self.time.start)
@@ -214,6 +222,11 @@ class Mapping:
                 raise InputError(f"[cycles]: {name} = {getattr(self.cycles, name)}: must not be negative")
         _check_encoding(self.read.encoding or "utf-8")
 
+    @property
+    def declared(self) -> Declared:
+        """What it declares about the test."""
+        return Declared(self.test, self.uncertainty, self.expansion, self.workpiece)
+
     def over(self, below: "Mapping") -> "Mapping":
         """Return this mapping, completed by the entries that only `below` has (not read, cycles, clean, limits)."""
         time = below.time if self.time == TimeColumn() else self.time
@@ -221,7 +234,8 @@ class Mapping:
         added = {name: rule for name, rule in below.columns.items() if (rule.column or name) not in taken}
         said = self.compensation or below.compensation
         columns, clocks = {**added, **self.columns}, self.clocks or below.clocks
-        return replace(self, time=time, columns=columns, compensation=said, clocks=clocks)
+        declared = vars(self.declared.over(below.declared))
+        return replace(self, time=time, columns=columns, compensation=said, clocks=clocks, **declared)
 
 
 #: only validator of external mappings; also used for the mapping that thermocomp writes into its own files
@@ -234,6 +248,10 @@ _TABLES: dict[str, type] = {
     "read": ReadOptions,
     "cycles": CycleRule,
     "limits": FileLimits,
+    "test": HeaderData,
+    "uncertainty": MeasuringUncertainty,
+    "expansion": ExpandingBody,
+    "workpiece": Workpiece,
 }
 
 
@@ -276,14 +294,16 @@ def check_content(content: dict[str, Any], owner: str) -> Mapping:
 def _explain(failure: ValidationError) -> str:
     """Return the table, the key and the nearest known key for the first error of pydantic."""
     errors = failure.errors()
-    error = errors[0]
+    error = min(errors, key=lambda e: "missing" in e["type"])  # a misspelt key first
     if error["loc"][:1] == ("clean",):
         return _explain_step(error)
-    depth = 3 if error["loc"][0] == "columns" else 2
+    depth = 3 if error["loc"][0] in ("columns", "expansion") else 2
     loc = [str(part) for part in error["loc"][:depth]]  # the remaining parts are union members, not written by the user
     inside = _TABLES.get(loc[0]) if len(loc) == depth else None
     table = f"table [{'.'.join(loc[:-1])}]" if len(loc) > 1 else "top level"
     key = loc[-1]
+    if "missing" in error["type"]:
+        return f"{table}: key {key!r} is missing; add it"
     if error["type"] != "unexpected_keyword_argument":
         reasons = " or: ".join(e["msg"] for e in errors if e["loc"][:depth] == error["loc"][:depth])
         return f"{table}: key {key!r} = {error['input']!r:.80}: {reasons}"

@@ -112,6 +112,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         compensation=mapping.compensation,
         time_unit="timestamp" if file.is_stamp else "" if confirmed else columns.time_unit or "s",
         clocks=mapping.clocks,
+        declared=mapping.declared,
     )
     return _zeroed(clean(rows, mapping.clean), columns) if mapping.clean else rows
 
@@ -171,6 +172,7 @@ def make_recording(rows: Rows, time: FloatArray, table: pd.DataFrame, labels: Se
         compensation=rows.compensation,
         time_unit=rows.time_unit,
         clocks=rows.clocks,
+        declared=rows.declared,
     )
     return recording.with_cycles(_cycles(recording, labels, rows))
 
@@ -204,8 +206,14 @@ def write(recording: Recording, path: str | Path, *, overwrite: bool = False) ->
     names = [_as_written(name, as_text=as_text) for name in names]
     out["cycle"] = np.repeat(names, [len(c) for c in recording.cycles])
     time = TimeColumn(column="time_s", unit="s", start=recording.start)
-    embedded = Mapping(time, described, compensation=recording.compensation, clocks=recording.clocks)  # type: ignore[arg-type]
-    needed = bool(described or recording.start or recording.compensation or recording.clocks)
+    embedded = Mapping(
+        time,
+        described,
+        compensation=recording.compensation,  # type: ignore[arg-type]
+        clocks=recording.clocks,
+        **vars(recording.declared),
+    )
+    needed = embedded != Mapping(time) or bool(recording.start)
     text = ADAPTER.dump_json(embedded, exclude_defaults=True).decode() if needed else ""
     with draft(target, overwrite=overwrite) as started:
         if as_text:
