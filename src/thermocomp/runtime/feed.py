@@ -125,7 +125,8 @@ class TemperatureFeed:
         repeated = self.unchanged(feed) and feed.repeated >= 1.0
         if not (repeated or 1.0 <= feed.changes < len(self.names)):
             return ""
-        given = [(n, _temperature(values.get(n)), v, s) for n, v, s in zip(self.names, feed.values, feed.steps)]
+        rows = zip(self.names, feed.values, feed.steps, strict=False)
+        given = [(n, _temperature(values.get(n)), v, step) for n, v, step in rows]
         moves = {n: now - v for n, now, v, step in given if step > LARGEST and now != v and NONE not in (now, v)}
         coarse, finer = self._thresholds.unknown_step + 1e-6, dict[str, float]()
         for watch in self._watches if 2 * len(moves) > len(self.names) else ():
