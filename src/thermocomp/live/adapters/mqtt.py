@@ -127,7 +127,7 @@ class MqttSource(Broker):
     def _receive(self, inbox: Inbox, message: aiomqtt.Message) -> None:
         try:
             payload = message.payload if isinstance(message.payload, bytes | str) else b""
-            reading = read_message(payload, -1.0 if message.retain else time.time(), self.names, self.unread)
+            reading = read_message(payload, -1.0 if message.retain else inbox.arrival(), self.names, self.unread)
         except ReadingError as e:
             self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
             return
