@@ -1,16 +1,18 @@
 """Wrong spindle speeds and frozen sources, with the compensator as at the machine, reading by reading.
 
 Run with ``python benchmarks/bench_speed.py [instants] [virtual] [healthy] [measured]`` (20 instants per recording and
-fault; all parts). The models are those of `tc.fit`, with their verdicts and watches. On machines unseen in the training
-(other seeds, other speeds; fl_thermal also with each cycle left out) the speed fails at random instants: when is it
-named, and what does the axis do meanwhile? When is a source found that stops? Is there a false alarm on sound machines
-in other weather, at other speeds, with heat of cutting?
+fault; all parts; ``THERMOCOMP_SEED`` is added to all seeds, ``THERMOCOMP_HOURS`` replaces 200 h). The models are
+those of `tc.fit`, with their verdicts and watches. On machines unseen in the training (other seeds, other speeds;
+fl_thermal also with each cycle left out) the speed fails at random instants: when is it named, and what does the axis
+do meanwhile? When is a source found that stops? Is there a false alarm on sound machines in other weather, at other
+speeds, with heat of cutting?
 
 Runs in which the speed is wrong by more than a quarter of its range for less than 20 min are not counted in the times.
 Harm is an error of an active axis above that without compensation and a margin. A model does such harm with all
 sensors intact, too, where the drift is near zero: the goal applies to what a wrong speed adds.
 """
 
+import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +39,8 @@ FloatArray = NDArray[np.float64]
 
 PARTS = ("virtual", "healthy", "measured")
 INSTANTS = 20
-HOURS = 200.0
+HOURS = float(os.environ.get("THERMOCOMP_HOURS", "200"))
+SEED = int(os.environ.get("THERMOCOMP_SEED", "0"))
 PHYSICS: tuple[Physics, ...] = ("linear", "nonlinear")
 SENSORS = ("all", "six")
 METHODS = ("averaged", "dynamic")
@@ -266,7 +269,7 @@ def freeze(model: ErrorModel, test: Recording, count: int) -> bool:
     for per, every in UPDATES:
         readings = [r for r in machine.updates(per, every) if machine.time[r[0]] < 0.6 * machine.time[-1]]
         early = [k for k, (row, _) in enumerate(readings) if machine.time[row] > 3600.0]
-        begins = set(np.random.default_rng(per).choice(early, count, replace=False).tolist())
+        begins = set(np.random.default_rng(SEED + per).choice(early, count, replace=False).tolist())
         state, found, wrong = machine.compensator.start(), list[float](), set[str]()
         for k, (row, late) in enumerate(readings[: max(begins) + 1]):
             state, _ = machine.step(state, row, late=late)
@@ -296,8 +299,8 @@ def virtual(count: int) -> bool:
     reached = True
     for physics in PHYSICS:
         (demo,) = tc.simulate("demo", physics=physics)
-        (other,) = tc.simulate("demo", physics=physics, seed=101)
-        tests = {"demo of another seed": other, "drawn speeds": draw(physics, 102, jobs=JOBS)}
+        (other,) = tc.simulate("demo", physics=physics, seed=SEED + 101)
+        tests = {"demo of another seed": other, "drawn speeds": draw(physics, SEED + 102, jobs=JOBS)}
         for sensors in SENSORS:
             print(f"\n{physics} machine, {sensors} sensors:")
             for method in METHODS:
@@ -305,7 +308,7 @@ def virtual(count: int) -> bool:
                 for seed, (title, test) in enumerate(tests.items()):
                     machine = Machine.of(model, test)
                     print(f" {method}, {title}, {machine.time[-1] / 3600:.0f} h:")
-                    reached &= show(fail(machine, count, seed), sensors == "six", NAMED)
+                    reached &= show(fail(machine, count, SEED + seed), sensors == "six", NAMED)
                 if method == METHODS[0]:
                     reached &= freeze(model, other, count)
     return reached
@@ -316,11 +319,11 @@ def healthy(_: int) -> bool:
     reached, tests = True, range(max(1, round(HOURS / 25)))
     for physics in PHYSICS:
         (demo,) = tc.simulate("demo", physics=physics)
-        quiet, hot = [draw(physics, 200 + k, jobs=JOBS) for k in tests], list[Recording]()
-        moving = [draw(physics, 400 + k, jobs=JOBS, feed=True) for k in tests]
+        quiet, hot = [draw(physics, SEED + 200 + k, jobs=JOBS) for k in tests], list[Recording]()
+        moving = [draw(physics, SEED + 400 + k, jobs=JOBS, feed=True) for k in tests]
         for k in tests:
-            with cutting(k):
-                hot.append(draw(physics, 300 + k, jobs=JOBS))
+            with cutting(SEED + k):
+                hot.append(draw(physics, SEED + 300 + k, jobs=JOBS))
         for sensors in SENSORS:
             print(f"\n{physics} machine, {sensors} sensors, sound:")
             model = fit(demo, "z_um", METHODS[0], None if sensors == "all" else FEW)
@@ -343,7 +346,7 @@ def measured(count: int) -> bool:
         inputs = None if sensors == "all" else SIX
         for method in METHODS:
             print(f"\nfl_thermal, {sensors} sensors, ch5_um, trained on all cycles:")
-            runs = fail(Machine.of(fit(whole, "ch5_um", method, inputs), whole), count, 0)
+            runs = fail(Machine.of(fit(whole, "ch5_um", method, inputs), whole), count, SEED)
             reached &= show(runs, sensors == "six", NAMED_MEASURED)
         print(f"\nfl_thermal, {sensors} sensors, ch5_um, each cycle unseen:")
         runs = []
@@ -351,7 +354,7 @@ def measured(count: int) -> bool:
             rest = [j for j in range(len(parts)) if j != k]
             model = fit([parts[j] for j in rest], "ch5_um", METHODS[0], inputs, [starts[j] for j in rest])
             sound(f"cycle {k + 1} unseen, all cycles run, sound", model, [whole], 1, 15.0)
-            runs += fail(Machine.of(model, whole), max(1, count // len(parts)), k, (cuts[k], cuts[k + 1]))
+            runs += fail(Machine.of(model, whole), max(1, count // len(parts)), SEED + k, (cuts[k], cuts[k + 1]))
         reached &= show(runs, sensors == "six", NAMED_MEASURED)
     return reached
 

@@ -36,6 +36,10 @@ from thermocomp.runtime.compensator import Compensator
 from thermocomp.virtual.datasets import record
 from thermocomp.virtual.experiments import simulate
 
+#: seed of the virtual machine, and its seconds in one of the world: others are tried by hand
+SEED, FACTOR = int(os.environ.get("THERMOCOMP_SEED", "7")), float(os.environ.get("THERMOCOMP_FACTOR", "60"))
+RESTARTS = int(os.environ.get("THERMOCOMP_RESTARTS", "20"))
+
 CONFIG = """
 models = ["model.json"]
 state = "state.json"
@@ -89,7 +93,7 @@ class Machine(threading.Thread):
     def __init__(self, port: int, factor: float) -> None:
         super().__init__(daemon=True)
         self.port, self.factor = port, factor
-        test = next(iter(simulate(find_experiment("demo", Path()), seed=7)))
+        test = next(iter(simulate(find_experiment("demo", Path()), seed=SEED)))
         names = [c.name for c in test.channels]
         inputs = [k for k, c in enumerate(test.channels) if c.quantity in ("temperature", "spindle_speed")]
         self.rows = [

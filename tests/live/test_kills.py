@@ -67,7 +67,7 @@ def test_no_step_above_the_rate(kills: int, tmp_path: Path) -> None:
         process = start()
         async with aiomqtt.Client("127.0.0.1", broker.port) as client:
             while in_force(path) is None:
-                await client.publish("m", json.dumps({"t": 20.0, "time": time.time()}))
+                await client.publish("m", json.dumps({"t": rng.uniform(20.0, 20.01), "time": time.time()}))
                 await asyncio.sleep(0.03)
             begin, due, done = time.monotonic(), 6.0, 0
             while done < kills or time.monotonic() - begin < due:

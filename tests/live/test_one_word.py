@@ -253,6 +253,31 @@ def test_refused_messages_are_an_alarm_and_end_active(broker: Mosquitto, bad: di
     asyncio.run(running(own, work))
 
 
+@pytest.mark.parametrize(("raw", "text"), [("21,3", '"21,3"'), ("n/a", '"n/a"'), (None, "null")])
+def test_a_channel_sent_as_text_is_named_with_its_source(broker: Mosquitto, raw: str | None, text: str) -> None:
+    source = MqttSource(topic="m/t", port=broker.port, names={"T": "t"})
+    own = Service(machine(), [source], [])
+    said = f"t: received {text} from MQTT m/t, expected a number, not in quotes"
+
+    async def work() -> None:
+        await asyncio.sleep(0.5)
+        async with aiomqtt.Client("127.0.0.1", broker.port) as client:
+
+            async def heard(message: dict[str, Any], alarms: list[str]) -> None:
+                await client.publish("m/t", json.dumps(message))
+                await until(lambda: snapshot(own, 1.0)["alarms"] == alarms)
+
+            await heard({"T": 20.0, "other": 1.0}, [])
+            await heard({"T": raw, "other": 1.0, "unit": "degC"}, [said])  # a text that no model uses is none
+            await until(lambda: any(said == e.text for e in own.events))
+            await client.publish("m/t", json.dumps({"other": 2.0}))
+            await until(lambda: own.latest["other"][0] == 2.0)
+            assert said in snapshot(own, 1.0)["alarms"]
+            await heard({"T": 21.0}, [])
+
+    asyncio.run(running(own, work))
+
+
 # -- frozen from the first reading -------------------------------------------------------------------------------------
 
 

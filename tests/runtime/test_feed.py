@@ -381,7 +381,8 @@ def test_recordings_that_repeat_forbid_to_count() -> None:
 
 def test_a_counter_that_does_not_advance_is_a_stop() -> None:
     source = Source(3)
-    assert source.say(1, counter=1.0) == [""]
+    first = "the counter of the readings has been 1 since the start: the source has stopped"
+    assert source.say(9, counter=1.0, travel=10.0) == [first] * 9  # it may have stopped before
     said = source.say(8, counter=2.0, travel=10.0)
     assert [bool(why) for why in said] == [False] * 7 + [True]  # after more than 60 s
     assert said[-1] == "the counter of the readings has been 2 for 70 s: the source has stopped"

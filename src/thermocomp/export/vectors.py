@@ -186,7 +186,7 @@ def make_readings(tables: Tables) -> Readings:
     rows += [(rows[-1][0], 0.0, 20.0, 0.0)] * 20
     _turn(machine, add, 5)
     for k in range(12):
-        add(machine.run(0.8, age / 3), age / 3, counter=7.0 + max(k - 8, 0))
+        add(machine.run(0.8, age / 3), age / 3, counter=7.0 + (k > 0) + max(k - 8, 0))  # the first shows nothing
     values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
     return Readings(values, ages, steps, counters)
 

@@ -19,7 +19,7 @@ CONFIGURED = "by configuration"
 
 #: orders that remain although there is no zero: the correction is not in force, or not known
 _STRONGER = ("shadow", *UNKNOWN)
-_ASKED = "let the machine cool down, set its zero anew, then order 're-zero'"
+ASKED = "let the machine cool down, set its zero anew, then order 're-zero'"
 #: in a state file, while the only zero there is was taken on a machine that may have been warm
 _INVALID = StoredZero(begun=math.nan, read=math.nan, inputs={}, targets={})
 #: correction in force above which the machine may be warm [um]
@@ -89,11 +89,11 @@ class StateKeeper:
         if not recent:
             self.cold, self._aged = f"{self._path.name} is {_tell_age(age)}", state.corrections
             if age < 0.0 and any(max(abs(d.offset), abs(d.slope)) > WARM for d in saved.state.raw.values()):
-                state = self._hold(state, f"{self.cold}, and the machine was warm when it was written: {_ASKED}")
+                state = self.hold(state, f"{self.cold}, and the machine was warm when it was written: {ASKED}")
         elif self._zero is None:
             self.no_zero = held[0] if held else None
         elif self._zero.begun != state.zeroed:
-            state = self._hold(state, held[0].reason if held else f"these models took their zero warm: {_ASKED}")
+            state = self.hold(state, held[0].reason if held else f"these models took their zero warm: {ASKED}")
         how = "continues" if state.references else "starts again, with the corrections that are in force"
         self._say(f"start after {age:.0f} s: {how}")
         return state
@@ -128,7 +128,7 @@ class StateKeeper:
         zero, self.pending = self._zero, None
         if isinstance(rebuilt, str):
             self._say(f"the models have no valid zero: {rebuilt}")
-            return self._hold(state, f"{rebuilt}: {_ASKED}")
+            return self.hold(state, f"{rebuilt}: {ASKED}")
         self._say("the slow states are rebuilt from the journal")
         assert zero is not None
         assert rebuilt.time is not None
@@ -156,9 +156,9 @@ class StateKeeper:
         if self._aged is not None and not lately and _size(in_force, self._aged.get(target)) <= WARM:
             return state
         what = f"{in_force.offset:+.1f} um" + (f" and {in_force.slope:+.1f} um/m" if in_force.slope else "")
-        return self._hold(state, f"{self.cold}, but {target} has {what} in force, so the machine may be warm: {_ASKED}")
+        return self.hold(state, f"{self.cold}, but {target} has {what} in force, so the machine may be warm: {ASKED}")
 
-    def _hold(self, state: CompensatorState, why: str) -> CompensatorState:
+    def hold(self, state: CompensatorState, why: str) -> CompensatorState:
         """Return the state with the corrections held, until there is a valid zero; shadow comes before that."""
         self.no_zero = Status(NO_ZERO, why)
         free = [t for t in state.corrections if (o := state.orders.get(t)) is None or o.word not in _STRONGER]

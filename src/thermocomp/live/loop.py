@@ -18,7 +18,7 @@ from thermocomp.live.curves import Curves
 from thermocomp.live.events import Events
 from thermocomp.live.firstchange import step_changing
 from thermocomp.live.inforce import AtController, ConfirmedCorrections, confirms, suspensions
-from thermocomp.live.keeper import CONFIGURED, StateKeeper
+from thermocomp.live.keeper import ASKED, CONFIGURED, StateKeeper
 from thermocomp.live.latest import Latest
 from thermocomp.live.ledger import ProbingLedger
 from thermocomp.live.links import SELDOM, TIMEOUT, Inlet, Link, Outlet, within
@@ -78,6 +78,7 @@ class Service:
         self.state = self.keeper.begin()
         self._saved, self._dirty, self._trouble, self._ending = -1e9, False, "", False
         self._heard = self.clock.tick()
+        self._unread = list[str]()
         self._untimely = "", -math.inf  # why the stamp of a reading was invalid, and when
         self._told_behind = -math.inf
         self._told_untimely, self._begun, self._shown = -math.inf, False, dict[str, Status]()
@@ -134,6 +135,7 @@ class Service:
             )
             self._told_behind = tick
         fresh = {name: value for name, (value, at) in self.latest.items() if tick - at <= most}
+        self._look_for_stale_zero(fresh)
         probings, learned, started = self.probings.take(), self.state.learned, self.state.references.keys()
         self.state, said = step_changing(self.compensator, self.state, Reading(now, fresh), probings, tick, self._since)
         self._heard = tick
@@ -232,6 +234,12 @@ class Service:
         why, at = self._untimely
         return why if self.clock.tick() - at <= 10.0 * self.clock.speed else ""
 
+    def unread(self) -> list[str]:
+        """Return what was received for channels in use and is no number, with its source."""
+        ends = [(one.name, getattr(one.end, "unread", {}).items()) for one in self.inlets]
+        every = [(name, text, where) for where, items in ends for name, text in items if name in self.latest.used]
+        return [f"{n}: received {text} from {where}, expected a number, not in quotes" for n, text, where in every]
+
     def links(self) -> list[Link]:
         """Return the links of sources, probes and sinks, in this order."""
         return [*self.inlets, *self.outlets]
@@ -287,6 +295,18 @@ class Service:
         self.state = wait_for_start(self.state, target, held)
         return held
 
+    def _look_for_stale_zero(self, values: Mapping[str, float]) -> None:
+        """Drop a zero taken from values that a reading shows to be old: hold the corrections, or average it anew."""
+        found = self.compensator.feed.find_stale(self.state.feed, values)
+        if not found or self.keeper.no_zero is not None:
+            return
+        why = f"{found}, after it had repeated since the start at {self._since}"
+        if self.state.references:
+            self.state = self.keeper.hold(self.state, f"{why}: the zero is of old values; {ASKED}")
+        else:
+            self.state = zero_anew(self.compensator, self.state)._replace(away=self.state.away)
+        self.say("reference", f"the zero is {'not valid' if self.state.references else 'averaged anew'}: {why}")
+
     @property
     def _zero_allowed(self) -> bool:
         """Whether a target starts from zero if no sink knows its correction in force."""
@@ -335,6 +355,9 @@ class Service:
             for one in self.links():
                 for text in one.news():
                     self.say("link", text)
+            for text in set(unread := self.unread()).difference(self._unread):
+                self.say("link", text)
+            self._unread = unread
             if self._ending:
                 continue
             await self._learn_start()

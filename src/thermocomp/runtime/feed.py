@@ -72,10 +72,12 @@ class TemperatureFeed:
         """
         if is_number(counter) and 0.0 < (number := float(counter)) <= LARGEST:  # type: ignore[arg-type]
             advances = number != feed.counter
-            feed = feed._replace(counter=number, waited=0.0 if advances else feed.waited + travel)
+            # the first number shows nothing: the source may have stopped before
+            begun = 0.0 if feed.counter else NONE
+            feed = feed._replace(counter=number, waited=begun if advances else feed.waited + travel)
             if feed.waited > longest:
-                stands = f"the counter of the readings has been {number:g} for {feed.waited:.0f} s"
-                return feed, f"{stands}: the source has stopped"
+                since = "since the start" if feed.waited >= NONE else f"for {feed.waited:.0f} s"
+                return feed, f"the counter of the readings has been {number:g} {since}: the source has stopped"
             if not advances:
                 return feed, self.explain(feed)
         given = tuple([_temperature(values.get(name)) for name in self.names])
@@ -112,6 +114,25 @@ class TemperatureFeed:
     def unchanged(self, feed: FeedState) -> bool:
         """Return whether no temperature has ever changed: the source may never have measured."""
         return bool(feed.steps) and min(feed.steps) > LARGEST
+
+    def find_stale(self, feed: FeedState, values: Mapping[str, object]) -> str:
+        """Return which temperature of a reading shows that those since the start were old; empty if none does.
+
+        After a long time a coarse sensor changes by its resolution: `Thresholds.unknown_step`. If most temperatures
+        change, it was the source that had stopped; then `Watched.frozen` is enough. A temperature counts at its first
+        change, since each may arrive in a message of its own.
+        """
+        repeated = self.unchanged(feed) and feed.repeated >= 1.0
+        if not (repeated or 1.0 <= feed.changes < len(self.names)):
+            return ""
+        rows = zip(self.names, feed.values, feed.steps, strict=False)
+        given = [(n, _temperature(values.get(n)), v, step) for n, v, step in rows]
+        moves = {n: now - v for n, now, v, step in given if step > LARGEST and now != v and NONE not in (now, v)}
+        coarse, finer = self._thresholds.unknown_step + 1e-6, dict[str, float]()
+        for watch in self._watches if 2 * len(moves) > len(self.names) else ():
+            finer |= zip(watch.names, watch.limits("frozen").tolist(), strict=True)
+        far = [n for n, moved in moves.items() if abs(moved) > min(coarse, finer.get(n, coarse))]
+        return f"{far[0]} has changed by {moves[far[0]]:+.1f} degC at once" if far else ""
 
     def explain(self, feed: FeedState) -> str:
         """Return why the feed has stopped; empty if it has not."""

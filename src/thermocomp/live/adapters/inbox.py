@@ -1,7 +1,9 @@
 """Messages that wait to be processed: only the newest value of each channel, so that a slow machine uses fresh ones."""
 
 import asyncio
+import time
 from collections import deque
+from contextlib import suppress
 
 from thermocomp.core.reading import Reading
 
@@ -11,6 +13,8 @@ MOST = 100_000
 ROUNDS = 4
 #: maximum time for which messages are collected before they are processed [s]
 LONGEST = 0.05
+#: time since all messages that had arrived were known, up to which one that is read counts as just arrived [s]
+LATE = 1.0
 
 
 class Inbox:
@@ -22,7 +26,13 @@ class Inbox:
         self._news = asyncio.Event()
         self._arrived = 0
         self.replaced = 0  #: number of values that were not processed, because there was a newer one or no room
+        self._emptied = time.monotonic()  # when all that had arrived were known
         self.closed = False  #: no further reading can arrive
+
+    def arrival(self) -> float:
+        """Return when a message that is read now has arrived; the earliest time if others have waited before it [s]."""
+        late = time.monotonic() - self._emptied
+        return time.time() - (late if late > LATE else 0.0)
 
     def put(self, reading: Reading) -> None:
         """Add a reading; if there are too many values, the oldest readings are dropped."""
@@ -48,13 +58,19 @@ class Inbox:
         list of Reading
             One for each time, the oldest first.
         """
-        await self._news.wait()
+        while not self._news.is_set():
+            self._emptied = time.monotonic()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LATE / 2.0):
+                    await self._news.wait()
         loop, quiet = asyncio.get_running_loop(), 0
         end = loop.time() + LONGEST
         while quiet < ROUNDS and loop.time() < end:
             before = self._arrived
             await asyncio.sleep(0)
             quiet = quiet + 1 if self._arrived == before else 0
+        if quiet == ROUNDS:
+            self._emptied = time.monotonic()
         if not self.closed:
             self._news.clear()
         newest: dict[str, tuple[float, float]] = {}
@@ -66,6 +82,6 @@ class Inbox:
         self._waiting.clear()
         self._values = 0
         by_time: dict[float, dict[str, float]] = {}
-        for name, (time, value) in newest.items():
-            by_time.setdefault(time, {})[name] = value
-        return [Reading(time, values) for time, values in sorted(by_time.items())]
+        for name, (at, value) in newest.items():
+            by_time.setdefault(at, {})[name] = value
+        return [Reading(at, values) for at, values in sorted(by_time.items())]

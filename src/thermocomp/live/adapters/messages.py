@@ -24,13 +24,17 @@ _KNOWN = {"time", "id", "target", "under_correction", *_NUMBERS}
 _LONG = 200
 
 
-def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str]) -> Reading:
+def read_message(
+    payload: bytes | str, arrived: float, names: Mapping[str, str], unread: dict[str, str] | None = None
+) -> Reading:
     """Return the reading in a message.
 
     Parameters
     ----------
     arrived : float
         Present time of the clock [s], used if the message has no time.
+    unread : dict of str to str, optional
+        Channels whose last value was no number, and that value; updated.
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:
@@ -42,6 +46,11 @@ def read_message(payload: bytes | str, arrived: float, names: Mapping[str, str])
             "1790000000.0; without time a message counts from its arrival"
         )
     values = {names.get(name, name): v for name, raw in content.items() if (v := _number(raw)) is not None}
+    if unread is not None and (unread or len(values) < len(content)):
+        others = {names.get(n, n): escape(json.dumps(v), 40) for n, v in content.items() if _number(v) is None}
+        found = {n: v for n, v in (unread | others).items() if n not in values}
+        unread.clear()
+        unread.update(list(found.items())[-MOST_VALUES:])
     if not values:
         raise ReadingError(
             'a message without any number; expected a number, not in quotes, for each channel: {"t1_C": 21.3}'

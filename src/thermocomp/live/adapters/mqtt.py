@@ -103,6 +103,7 @@ class MqttSource(Broker):
     counter: str = ""
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
+    unread: dict[str, str] = field(default_factory=dict, init=False)  #: channels whose last value was no number
     _inbox: Inbox | None = field(default=None, init=False, repr=False)
     _changes: ReportedChanges | None = field(default=None, init=False, repr=False)
 
@@ -126,7 +127,7 @@ class MqttSource(Broker):
     def _receive(self, inbox: Inbox, message: aiomqtt.Message) -> None:
         try:
             payload = message.payload if isinstance(message.payload, bytes | str) else b""
-            reading = read_message(payload, -1.0 if message.retain else time.time(), self.names)
+            reading = read_message(payload, -1.0 if message.retain else inbox.arrival(), self.names, self.unread)
         except ReadingError as e:
             self.refused, self.last_refusal = self.refused + 1, f"{escape(message.topic, 200)}: {e}"
             return

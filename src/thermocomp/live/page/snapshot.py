@@ -83,6 +83,7 @@ def find_alarms(service: Service) -> Iterator[str]:
             yield f"{one.name}: {one.refusing}"
         if (link := one.status()).state == "failed" or (link.state == "closed" and link.reason and not one.ended):
             yield f"{one.name}: {link.reason}"
+    yield from service.unread()
     if service.untimely:
         yield f"readings are not used: {service.untimely}"
     if said is not None and said.rejected:

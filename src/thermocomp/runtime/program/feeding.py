@@ -17,7 +17,7 @@ def heed(s: Kept, w: Work, t: Constants) -> None:
         renewed.set(s.counter.differs(w.counter))
         s.waited = s.waited + w.travel
         with when(renewed):
-            s.waited = 0.0
+            s.waited = choose(s.counter > 0.0, 0.0, NONE)
         s.counter = w.counter
         w.passes = s.waited <= t.reading_age
     with when(t.has_feed), when(w.passes & renewed):
