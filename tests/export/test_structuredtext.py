@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import stmachine
 from blark.parse import parse
 from driftmodels import ACCEPTED
 from hypothesis import HealthCheck, Phase, example, given, settings
@@ -23,7 +24,7 @@ from thermocomp.export.st.package import write_package
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.ststatements import RESERVED
 from thermocomp.export.st.sttest import write_test
-from thermocomp.export.vectors import Readings, make_readings, replay
+from thermocomp.export.vectors import NOTHING, TOLD_COLD, Readings, make_readings, replay
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
@@ -108,20 +109,21 @@ def test_its_own_test_finds_a_mistake(
 def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[SourceUnit]) -> None:
     tables, machine = gather(watched), Machine(units)
     readings = make_readings(tables)
-    warm = Readings(readings.values[:165], readings.age[:165], readings.dt[:165])
+    warm = Readings(readings.values[:165], readings.age[:165], readings.dt[:165])  # and none of the events but the first
     run(machine, warm, 1, len(tables.sensors))
     before = machine.memory.correction[0]
     assert abs(before) > 5.0
     values = [float(v) for v in readings.values[164]]
-    again = {"value": values, "good": [True] * len(values), "age": 0.0, "elapsed": 10.0}
-    said = machine.call(**again, restart=True)
+    again = {"value": values, "good": [True] * len(values), "age": 0.0, "elapsed": 10.0, "reading": 0.0}
+    none, told = (stmachine.happening(event, 0.0) for event in (NOTHING, TOLD_COLD))
+    said = machine.call(**again, **told)
     assert said.status[0] == 0
     assert said.correction[0] == before
     fresh, moved = Machine(units), [before]
-    fresh.call(**again, restart=False)
+    fresh.call(**again, **told)
     for _ in range(200):
-        moved.append(machine.call(**again, restart=False).correction[0])
-        assert list(fresh.call(**again, restart=False).status) == list(machine.memory.status)
+        moved.append(machine.call(**again, **none).correction[0])
+        assert list(fresh.call(**again, **none).status) == list(machine.memory.status)
     assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
     assert moved[-1] == fresh.memory.correction[0]
 
