@@ -19,7 +19,7 @@ from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.powerup import find_cold_after, machine_seems_warm, power_up, rezero_measured
+from thermocomp.runtime.powerup import find_cold_after, machine_seems_warm, power_up, rezero_measured, take_at_once
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.state import NO_ZERO, CompensatorState
 from thermocomp.runtime.watch import WORDS
@@ -75,20 +75,24 @@ def replay(
     """Replay readings through a compensator from its power-up without a state, and return its outputs."""
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = power_up(compensator, None, math.nan), 0.0, False, []
-    warm, waiting = False, dict[str, float]()
+    warm, waiting, resumed = False, dict[str, float](), set[str]()
     for *values, age, dt, counter, event, amount in readings.columns.tolist():
         if REZERO <= event < REZERO + len(targets):
             waiting[targets[int(event) - REZERO]] = amount
-        elif event != NOTHING:
+        elif NOTHING < event < REZERO:
             state = _begin(compensator, state, int(event), amount)
             clock, begun = state.clock or 0.0, state.clock is not None
             waiting, warm = (waiting, warm) if begun else ({}, False)
+            resumed = set(targets) if begun and amount > compensator.limits.hold else resumed if begun else set()
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
         tick = clock if good else math.nan  # an invalid clock advances nothing
         reading = Reading(tick - age, dict(zip(names, values, strict=True)), counter=counter)
         starting = any(np.isnan(m.reference).any() for m in state.models)
+        before = state
         state, said = compensator.step(state, reading, tick)
+        state, said = take_at_once(compensator, before, state, said, resumed)
+        resumed = {t for t in resumed if said.states[t].word not in ("active", "shadow")}
         if starting and not said.rejected:
             warm = machine_seems_warm(compensator, state)
         for target in [t for t in waiting if t in state.raw]:

@@ -1,16 +1,20 @@
 """Power-up of a controller: how the reference of its corrections is known again, or why not."""
 
 import math
+from collections.abc import Collection
 
 from thermocomp.core.correction import Correction
 from thermocomp.core.expression import Lag, Node, PacedLag
 from thermocomp.core.starting import seems_warm
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.limits import limit_line
 from thermocomp.runtime.orders import rezero
-from thermocomp.runtime.state import NO_ZERO, CompensatorState, Status, resume
+from thermocomp.runtime.state import NO_ZERO, Compensated, CompensatorState, Status, resume
 
 #: order of a target after a power-up on a machine that may be warm
 NO_REFERENCE = Status(NO_ZERO, "the machine may be warm: let it cool down, measure with the probe, or re-zero")
+#: time within which every correction is reached [s]
+AT_ONCE = 1e20
 #: after this multiple of its longest time constant without power, a machine is cold
 COLD = 4.0
 
@@ -82,6 +86,27 @@ def rezero_measured(
     now = state.corrections[target]
     wanted = Correction(now.offset - remaining, now.slope, now.reference_position)
     return rezero(compensator, state, target, time, "measured", wanted)._replace(corrections=state.corrections)
+
+
+def take_at_once(
+    compensator: Compensator,
+    before: CompensatorState,
+    after: CompensatorState,
+    said: Compensated,
+    targets: Collection[str],
+) -> tuple[CompensatorState, Compensated]:
+    """Return a step in which the corrections of some targets reach their models at once, as far as these are active.
+
+    For the first step after more than `Limits.hold` without power, when no axis is referenced yet: the retained
+    correction may be that of a machine that was warm hours ago.
+    """
+    limits, lines = compensator.limits, compensator.lines
+    found = dict(after.corrections)
+    for t in targets:
+        if said.states[t].word == "active":
+            wanted = Correction.opposing(said.deviations[t])
+            found[t] = limit_line(wanted, before.corrections[t], lines[t].travel, AT_ONCE, limits)
+    return after._replace(corrections=found), said._replace(corrections=found)
 
 
 def machine_seems_warm(compensator: Compensator, state: CompensatorState) -> bool:

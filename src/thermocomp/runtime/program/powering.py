@@ -21,6 +21,8 @@ def power_up(s: Kept, w: Work, t: Constants, off: Number) -> None:
     with when(known & (off > 0.0) & (off <= t.resumable)):
         w.begins = CONTINUES
         s.clock = s.clock + off
+        for k in each("k", t.TARGETS):
+            s.resumed[k] = s.resumed[k] | (off > t.hold)
         with when(t.watched), when(off > t.fault_duration):  # a value that is the same by chance was not constant
             for i in each("i", t.SENSORS):
                 s.read_once[i] = False

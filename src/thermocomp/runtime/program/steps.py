@@ -7,10 +7,12 @@ numbers only.
 """
 
 from thermocomp.core.bounds import GAP
+from thermocomp.runtime.powerup import AT_ONCE
 from thermocomp.runtime.program import feeding, powering, watching
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
 from thermocomp.runtime.program.language import (
+    choose,
     each,
     exp,
     function,
@@ -211,15 +213,17 @@ def drive(s: Kept, w: Work, t: Constants, k: Whole) -> None:
         w.offset = 0.0
         w.tilt = 0.0
         band.set(0.0)
+    travel = let("travel", choose(s.resumed[k], AT_ONCE, w.travel))
+    s.resumed[k] = False
     low = let("low", t.travel_low[k] - t.position[k])
     high = let("high", t.travel_high[k] - t.position[k])
     with when((low >= high) | (w.tilt.equals(0.0) & s.slope[k].equals(0.0))):
-        s.correction[k] = limit(w.offset, s.correction[k], w.travel, t.magnitude, t.rate, band)
+        s.correction[k] = limit(w.offset, s.correction[k], travel, t.magnitude, t.rate, band)
     with otherwise():
         w.end[0] = s.correction[k] + s.slope[k] * 0.001 * low
         w.end[1] = s.correction[k] + s.slope[k] * 0.001 * high
-        w.end[0] = limit(w.offset + w.tilt * 0.001 * low, w.end[0], w.travel, t.magnitude, t.rate, band)
-        w.end[1] = limit(w.offset + w.tilt * 0.001 * high, w.end[1], w.travel, t.magnitude, t.rate, band)
+        w.end[0] = limit(w.offset + w.tilt * 0.001 * low, w.end[0], travel, t.magnitude, t.rate, band)
+        w.end[1] = limit(w.offset + w.tilt * 0.001 * high, w.end[1], travel, t.magnitude, t.rate, band)
         rise = let("rise", (w.end[1] - w.end[0]) / (high - low))
         s.correction[k] = w.end[0] - rise * low
         s.slope[k] = 1000.0 * rise

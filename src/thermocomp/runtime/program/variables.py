@@ -53,6 +53,7 @@ class Kept(Record):
     remaining = numbers("deviation that was measured then, with the correction in force [um]", "TARGETS")
     shift = numbers("offset that counts from the last re-zero [um]", "TARGETS")
     tilt = numbers("slope that counts from it [um/m]", "TARGETS")
+    resumed = truths("the next correction is taken at once: the axes are not referenced yet", "TARGETS")
     warm = truth("at the start the temperatures were those of a warm machine")
     model = whole("fingerprint of the models of a retained state")
     checked = number("check value of a retained state", time=True)
