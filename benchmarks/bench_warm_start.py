@@ -4,16 +4,18 @@ Run with ``python benchmarks/bench_warm_start.py``; it requires a C compiler. Pr
 
 - `averaged` for z and its watch are fitted to the demo. The C block runs over the demo, and over a test not learned
   from: other speeds and weather. It is told cold at its start.
-- 200 restarts, half of them in each test, a third each off for 1 and 30 min and 8 h, at minutes drawn after the first
-  30. Machine and controller are switched off together: each restart is a test of its own, in which the spindle stands
-  from that minute on, until 2 min after the controller is on again, and then goes on. Rows while it is off are not read.
+- 200 restarts (198 in equal groups), half of them in each test, a third each off for 1 and 30 min and 8 h, at minutes
+  drawn after the first 30. Machine and controller are switched off together: each restart is a test of its own, in
+  which the spindle stands from that minute on, until 2 min after the controller is on again, and then goes on. Rows
+  while it is off are left out.
 - Retained: RMS of the error left over the next 4 h, of all restarts with one time off, at most 1.5 times that of the
   same rows running on (8 h: twice). Not retained: all corrections of the 4 h are 0, until a way out: after 10 min the
-  deviation is measured and given to it, and it is active; told cold, or off for longer than four times the longest time
-  constant, it is active after 5 min.
-- Hint: cold pattern are the temperatures of the training's start less their median, its sigma that of 200 cold starts in
-  five weathers (other seeds than those by which the rule was chosen). Of warm starts with ``|z| > 8 um`` one of whose
-  temperatures differs from the pattern by more than 3 sigma + 1 degC, 95 % seem warm; of the cold starts 2 % at most.
+  deviation is measured and given to it, and it is active; told cold, or off for longer than four times the longest
+  time constant, it is active after 5 min.
+- Hint: cold pattern are the temperatures of the training's start less their median, its sigma that of 200 cold starts
+  in five weathers (other seeds than those by which the rule was chosen). Of warm starts with ``|z| > 8 um`` one of
+  whose temperatures differs from the pattern by more than 3 sigma + 1 degC, 95 % seem warm; of the cold starts 2 % at
+  most.
 
 In a first form the rows were only left out, so that the machine went on while the controller was off (`GOES_ON`): then
 nothing is known of its speeds meanwhile, and the goals are missed after 30 min and 8 h.
@@ -26,8 +28,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from compiledblock import COMPILERS, OPTIMISED, CompiledBlock
+
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.export.vectors import DAMAGED, NOTHING, RETAINED, REZERO, TOLD_COLD, Answers, Readings
@@ -42,7 +44,7 @@ RESTARTS, COLD_STARTS, SEED = 200, 40, 42
 OFF = {60.0: 1.5, 1800.0: 1.5, 8 * 3600.0: 2.0}
 STEP, NEXT, FIRST, SETTLED = 20.0, 720, 90, 16
 HONEST = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so that it runs", rules=RULES)
-Segments = list[tuple[int, float]]  # duration [min], speed [1/min]
+Segments = list[tuple[int, int]]  # duration [min], speed [1/min]
 DEMO: Segments = [(15, 0)] + [s for n in (1200, 2800, 1000, 2000, 3200, 2400) for s in ((165, n), (135, 0))]
 OTHER: Segments = [(15, 0)] + [
     s for n in (900, 2450, 3050, 1550, 700, 2100, 2750, 1300) for s in ((45, n), (15, 0), (90, 3500 - n), (30, 0))
@@ -98,7 +100,9 @@ class Machine:
         self.z, self._block = samples.deviations[:, 0], block
         self.on = self.z + self.run(len(self.z)).correction[:, 0]
 
-    def run(self, end: int, begin: int = 0, events: dict[int, tuple[int, float]] | None = None, last: int = 0) -> Answers:
+    def run(
+        self, end: int, begin: int = 0, events: dict[int, tuple[int, float]] | None = None, last: int = 0
+    ) -> Answers:
         """Run rows up to `end`, then those from `begin` to `last`; events by the number of the row that is run."""
         values = np.vstack([self.values[:end], self.values[begin:last]])
         given = {0: (TOLD_COLD, 0.0)} | (events or {})
@@ -113,7 +117,7 @@ class Machine:
         begin = at + max(round(off / STEP), 1)
         events = {at: (event, amount)} | {at + k: (what, by) for k, what, by in more}
         said = self.run(at, begin, events, begin + NEXT)
-        return Answers(*(a[at:] for a in said))
+        return said._replace(**{name: a[at:] for name, a in said._asdict().items()})
 
 
 def check_restarts(block: CompiledBlock, cold_after: float) -> bool:
@@ -123,10 +127,10 @@ def check_restarts(block: CompiledBlock, cold_after: float) -> bool:
         for name, segments, climate in (("demo", DEMO, CLIMATES[0]), ("other", OTHER, CLIMATES[1])):
             left, on, none, measured, zero, known, active = [], [], [], [], True, True, []
             for _ in range(max(RESTARTS // (len(OFF) * 2), 1)):
-                minutes, skipped = round(off / 60.0), GOES_ON * off / 60.0
-                latest = sum(m for m, _ in segments) - NEXT * STEP / 60.0 - skipped
-                at = int(rng.integers(FIRST * STEP / 60.0, latest))
-                last = at + minutes + AGAIN + round(NEXT * STEP / 60.0)
+                minutes, later = round(off / 60.0), round(NEXT * STEP / 60.0)
+                latest = sum(m for m, _ in segments) - later - GOES_ON * minutes
+                at = int(rng.integers(round(FIRST * STEP / 60.0), latest))
+                last = at + minutes + AGAIN + later
                 parts = switch_off(segments, at, 0 if GOES_ON else minutes + AGAIN, last)
                 machine, row = Machine(block, run_test(parts, climate)), round(at * 60.0 / STEP)
                 rows = slice(row + round(off / STEP), row + round(off / STEP) + NEXT)
@@ -147,8 +151,8 @@ def check_restarts(block: CompiledBlock, cold_after: float) -> bool:
             good &= rms[0] <= goal * rms[1] and zero and known and all(active)
             print(
                 f"{name}, off {minutes} min, {len(left)} restarts: RMS {rms[0]:.2f} um, running on {rms[1]:.2f}, "
-                f"{rms[0] / rms[1]:.2f} times (goal {goal:g}; {np.mean(each):.0%} of them), no compensation {rms[2]:.2f}; "
-                f"not retained: {'0' if zero else 'NOT 0'} until a way out, told cold or off for long "
+                f"{rms[0] / rms[1]:.2f} times (goal {goal:g}; {np.mean(each):.0%} of them), no compensation "
+                f"{rms[2]:.2f}; not retained: {'0' if zero else 'NOT 0'} until a way out, told cold or off for long "
                 f"{'active' if known else 'NOT active'}, measured active in {np.mean(active):.0%}, RMS {rms[3]:.2f}",
                 flush=True,
             )
@@ -188,7 +192,9 @@ def check_hint(machines: list[Machine], block: CompiledBlock) -> bool:
             if abs(machine.z[at]) > 8.0 and (np.abs(own) > limits).any():
                 warm.append(bool(machine.restart(at, 0.0, DAMAGED, 0.0).warm[SETTLED]))
     found, false = np.mean(warm), np.mean(said)
-    print(f"hint: {found:.1%} of {len(warm)} warm starts (goal 95 %), {false:.1%} of {len(said)} cold starts (goal 2 %)")
+    print(
+        f"hint: {found:.1%} of {len(warm)} warm starts (goal 95 %), {false:.1%} of {len(said)} cold starts (goal 2 %)"
+    )
     return bool(found >= 0.95 and false <= 0.02)
 
 
@@ -205,7 +211,10 @@ def main() -> int:
         block = CompiledBlock(compensator, Path(folder), flags=OPTIMISED)
     machines = [Machine(block, s) for s in (samples, run_test(OTHER, CLIMATES[1]))]
     cold_after = float(block.tables.values["cold_after"])
-    print(f"a machine is cold after {cold_after / 3600:.1f} h; running on, RMS of the demo and of the other recording: ", end="")
+    print(
+        f"a machine is cold after {cold_after / 3600:.1f} h; running on, RMS of the demo and of the other recording: ",
+        end="",
+    )
     print(" and ".join(f"{np.sqrt(np.mean(m.on[FIRST:] ** 2)):.2f} um" for m in machines))
     restarts, hint = check_restarts(block, cold_after), check_hint(machines, block)
     print("reached" if restarts and hint else "MISSED")

@@ -42,6 +42,10 @@ def block(watched: Compensator, tmp_path_factory: pytest.TempPathFactory) -> Com
     return CompiledBlock(watched, tmp_path_factory.mktemp("power"))
 
 
+def part(said: Answers, begin: int) -> Answers:
+    return said._replace(**{name: a[begin:] for name, a in said._asdict().items()})
+
+
 Run = Callable[..., tuple[Answers, Answers]]
 
 
@@ -64,7 +68,7 @@ def restart(watched: Compensator, block: CompiledBlock) -> Run:
         found = block.run(readings)
         check_same(replay(watched, block.tables, readings), found)
         on = block.run(Readings(rows, np.zeros(len(rows)), np.full(len(rows), dt[0])))
-        return Answers(*(a[at:] for a in found)), Answers(*(a[begin:] for a in on))
+        return part(found, at), part(on, begin)
 
     return run
 
@@ -110,8 +114,9 @@ def test_the_ways_to_a_known_reference(restart: Run, watched: Compensator) -> No
 
 @needs_compiler
 def test_a_rezero_of_a_running_correction_is_no_jump(restart: Run) -> None:
-    (plain, _), (found, _) = restart(150, 60.0, (0, RETAINED, 60.0)), restart(
-        150, 60.0, (0, RETAINED, 60.0), (10, REZERO, 0.0), (40, REZERO, 2.0), (50, REZERO + 7, 2.0)
+    (plain, _), (found, _) = (
+        restart(150, 60.0, (0, RETAINED, 60.0)),
+        restart(150, 60.0, (0, RETAINED, 60.0), (10, REZERO, 0.0), (40, REZERO, 2.0), (50, REZERO + 7, 2.0)),
     )
     shifted = found.correction - plain.correction
     assert np.abs(shifted[:40, 0]).max() < 1e-9  # its datum was set anew: as it was

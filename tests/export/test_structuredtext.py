@@ -109,7 +109,9 @@ def test_its_own_test_finds_a_mistake(
 def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[SourceUnit]) -> None:
     tables, machine = gather(watched), Machine(units)
     readings = make_readings(tables)
-    warm = Readings(readings.values[:165], readings.age[:165], readings.dt[:165])  # and none of the events but the first
+    warm = Readings(
+        readings.values[:165], readings.age[:165], readings.dt[:165]
+    )  # and none of the events but the first
     run(machine, warm, 1, len(tables.sensors))
     before = machine.memory.correction[0]
     assert abs(before) > 5.0

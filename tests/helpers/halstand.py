@@ -89,7 +89,12 @@ void *find(const char *name)
 }
 long later;
 time_t time(time_t *at)
-{ struct timespec now; clock_gettime(CLOCK_REALTIME, &now); if (at) *at = now.tv_sec + later; return now.tv_sec + later; }
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    if (at) *at = now.tv_sec + later;
+    return now.tv_sec + later;
+}
 void run(int periods, long period) { while (periods--) function(instance, period); }
 """
 

@@ -40,7 +40,7 @@ class Machine:
             "Array": Array,
             "SEL": lambda g, one, other: other if g else one,
             "TRUNC": _trunc,
-            "COPY": lambda to, of: vars(to).update(vars(copy.deepcopy(of))),
+            "COPY": _copy,
             **_NUMBERS,
         }
         for block in blocks:
@@ -55,7 +55,9 @@ class Machine:
     def _memory(self, block: str) -> SimpleNamespace:
         """Return an instance of a function block."""
         head = self._heads[block]
-        return SimpleNamespace(**{n: self._new(k) for part in ("in", "inout", "out", "own") for n, k in head[part].items()})
+        return SimpleNamespace(
+            **{n: self._new(k) for part in ("in", "inout", "out", "own") for n, k in head[part].items()}
+        )
 
     def _new(self, kind: Type) -> Any:
         if isinstance(kind, tuple):
@@ -88,6 +90,11 @@ class Machine:
     def head(self, name: str) -> dict[str, Any]:
         """Return what a function takes and gives."""
         return self._heads[name]
+
+
+def _copy(to: SimpleNamespace, of: SimpleNamespace) -> None:
+    for name, value in vars(copy.deepcopy(of)).items():
+        setattr(to, name, value)
 
 
 def _trunc(value: float) -> int:
@@ -151,7 +158,9 @@ class _Function:
             lines.append(f"{pad}{name}.{parameter} = {f'Array({value})' if isinstance(wanted, tuple) else value}")
         return [*lines, f"{pad}{kind}({name})"]
 
-    def _statement(self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int) -> list[str]:
+    def _statement(  # noqa: PLR0911 - a case for every kind of statement
+        self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int
+    ) -> list[str]:
         pad = "    " * depth
         match s:
             case b.AssignmentStatement():

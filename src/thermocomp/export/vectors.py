@@ -19,7 +19,7 @@ from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.powerup import find_cold_after, machine_seems_warm, power_up, rezero_measured, take_at_once
+from thermocomp.runtime.powerup import machine_seems_warm, power_up, rezero_measured, take_at_once
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.state import NO_ZERO, CompensatorState
 from thermocomp.runtime.watch import WORDS
@@ -178,7 +178,7 @@ def make_readings(tables: Tables) -> Readings:
     source that repeats its values, and one whose counter does not advance. It is told cold at first; at the end it is
     switched off and on with a retained state, without one, and with one that cannot be used.
     """
-    machine, back = Warming(tables), tables.models[0].thresholds.return_time
+    machine = Warming(tables)
     events: dict[int, tuple[int, float]] = {0: (TOLD_COLD, 0.0)}
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
@@ -195,13 +195,7 @@ def make_readings(tables: Tables) -> Readings:
         dt = 60.0 if k % 3 else 12.0
         add(machine.run(_share(k), dt), dt, 0.25)
     events[len(rows)] = RETAINED, 1800.0
-    for c in range(len(machine.rest)):
-        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
-            values = machine.run(0.8, 15.0)
-            values[c] = wild
-            add(values, 15.0)
-        for _ in range(4):  # until the value is trusted again
-            add(machine.run(0.8, back / 3), back / 3)
+    _damage(machine, add, tables.models[0].thresholds.return_time)
     _turn(machine, add, 30)
     warm = machine.run(0.8, 10.0)
     for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
@@ -225,24 +219,30 @@ def make_readings(tables: Tables) -> Readings:
     _turn(machine, add, 5)
     for k in range(12):
         add(machine.run(0.8, age / 3), age / 3, counter=7.0 + max(k - 8, 0))
-    day, cold = float(tables.values["resumable"]), float(tables.values["cold_after"])
-    for event, amount, calls in (
-        (RETAINED, 1800.0, 8),
-        (RETAINED, 0.0, 8),  # for an unknown time
-        (REZERO, -7.0, 6),
-        (RETAINED, 60.0, 3),
-        (DAMAGED, min(1800.0, 0.9 * cold), 4),
-        (TOLD_COLD, 0.0, 6),
-        (RETAINED, max(day, cold) + 1.0, 6),
-        (DAMAGED, min(1e-3 * day, 0.9 * cold), 2),
-        (DAMAGED, 1.01 * cold, 6),
-    ):
+    for event, amount, calls in _switched(tables):
         events[len(rows)] = event, amount
         for _ in range(calls):
             add(machine.run(0.6, 15.0), 15.0)
     values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
     orders = np.array([events.get(k, (NOTHING, 0.0)) for k in range(len(rows))])
     return Readings(values, ages, steps, counters, orders[:, 0].astype(int), orders[:, 1])
+
+
+def _switched(tables: Tables) -> list[tuple[int, float, int]]:
+    """Return events of a controller that is switched off and on, with the number of calls after each."""
+    day, cold = float(tables.values["resumable"]), float(tables.values["cold_after"])
+    short = min(1800.0, 0.9 * cold)
+    return [
+        (RETAINED, 1800.0, 8),
+        (RETAINED, 0.0, 8),  # for an unknown time
+        (REZERO, -7.0, 6),
+        (RETAINED, 60.0, 3),
+        (DAMAGED, short, 4),
+        (TOLD_COLD, 0.0, 6),
+        (RETAINED, max(day, cold) + 1.0, 6),
+        (DAMAGED, short, 2),
+        (DAMAGED, 1.01 * cold, 6),
+    ]
 
 
 #: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit
@@ -252,6 +252,17 @@ _THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + 
 def _share(k: int) -> float:
     """Return the fraction of top speed at a step of a test."""
     return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
+
+
+def _damage(machine: Warming, add: Callable[[FloatArray, float], None], back: float) -> None:
+    """Make each value wild for a while, until it is trusted again."""
+    for c in range(len(machine.rest)):
+        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
+            values = machine.run(0.8, 15.0)
+            values[c] = wild
+            add(values, 15.0)
+        for _ in range(4):
+            add(machine.run(0.8, back / 3), back / 3)
 
 
 def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: int) -> None:

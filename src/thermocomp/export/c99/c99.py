@@ -258,7 +258,9 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
         guard=f"{name.upper()}_H",
         inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
         outputs=_enumerated(name, "OUT", [f"{t} [um]" for t in tables.targets]),
-        state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside s->warm"),
+        state=write_variables(
+            sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside s->warm"
+        ),
     )
     return Sources(name, header, "".join(_wrapped(line) for line in source.splitlines(keepends=True)))
 

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from thermocomp.export.vectors import Answers, Readings
 from thermocomp.runtime.program.tables import Tables
 
@@ -112,6 +114,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         1 um; `single` is 0 if single precision is not supported.
     """
     calls = range(len(readings.age))
+    told = np.column_stack([answers.status, answers.fault, answers.passed, answers.warm]).astype(int)
     return _PROGRAM.format(
         name=name,
         double=double,
@@ -124,10 +127,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         wanted=_rows(
             [x for pair in zip(answers.correction[k], answers.slope[k], strict=True) for x in pair] for k in calls
         ),
-        told=",\n".join(
-            f"    {{{', '.join(map(str, [*answers.status[k], *answers.fault[k], int(answers.passed[k]), int(answers.warm[k])]))}}}"
-            for k in calls
-        ),
+        told=",\n".join(f"    {{{', '.join(map(str, row))}}}" for row in told.tolist()),
         faults=_FAULTS if tables.sensors else "",
     )
 

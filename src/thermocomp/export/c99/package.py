@@ -69,10 +69,10 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
 
 {power}
 
-`{name}_save` fills a struct without pointers: write its bytes to non-volatile memory, with the time. `{name}_power_up` takes
-it back with the seconds since then, and returns 0 if it continues, 1 if the machine is cold by that time, 2 if the
-reference is unknown. A damaged struct (CRC-32) or one of other models counts as none, as does NULL. `{name}_cold(&state)`
-tells it cold; `{name}_rezero(&state, k, remaining)` re-zeroes a correction [um].
+`{name}_save` fills a struct without pointers: write its bytes to non-volatile memory, with the time.
+`{name}_power_up` takes it back with the seconds since then, and returns 0 if it continues, 1 if the machine is cold by
+that time, 2 if the reference is unknown. A damaged struct (CRC-32) or one of other models counts as none, as does NULL.
+`{name}_cold(&state)` tells it cold; `{name}_rezero(&state, k, remaining)` re-zeroes a correction [um].
 
 ## Test the sign
 
@@ -81,7 +81,8 @@ tells it cold; `{name}_rezero(&state, k, remaining)` re-zeroes a correction [um]
 ## Switch it off
 
 Do not set the correction to zero in one step: the axis would jump. Instead, call `{name}_step` with an age of 1e9: the
-correction is held for {hold:g} s and then decays slowly to zero. Do not use the controller's own temperature compensation at the same time.
+correction is held for {hold:g} s and then decays slowly to zero. Do not use the controller's own temperature
+compensation at the same time.
 """
 
 

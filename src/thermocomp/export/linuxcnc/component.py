@@ -19,8 +19,8 @@ pin in bit good-#[{inputs}] = TRUE;     /* FALSE for a sensor that reports a fai
 pin in u32 reading;              /* counter of readings: the values are new when it changes */
 pin in bit enable = TRUE;        /* FALSE: corrections are held, then decay to zero */
 
-pin in bit told-cold;            /* TRUE: the machine is cold at power-up; ignored once the reference is known */
-pin in bit rezero;               /* when it becomes TRUE: correction-K continues from its value minus `measured` */
+pin in bit told-cold;            /* TRUE: the machine is cold; ignored once the reference is known */
+pin in bit rezero;               /* rising edge: correction-K continues from its value minus `measured` */
 pin in s32 rezero-target;        /* K */
 pin in float measured;           /* deviation (actual minus commanded) with the correction in force [mm] */
 
@@ -31,7 +31,8 @@ pin in bit teleop-mode;
 {axes}
 pin out float correction-#[{targets}];  /* [mm] */
 pin out float slope-#[{targets}];       /* [um/m] */
-pin out s32 status-#[{targets}];        /* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow, 5 its reference is unknown */
+/* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow, 5 its reference is unknown */
+pin out s32 status-#[{targets}];
 {faults}/* why a reading was not used: 0 it was used, 1 its time, 2 a value, 3 not a start, 4 the source has stopped */
 pin out s32 rejected;
 pin out s32 outside;             /* number of inputs beyond the trained range */

@@ -68,9 +68,10 @@ Its exit code is 0 if all agree. Step 6 below verifies the rest at the machine.
 
 {power}
 
-The state outlasts LinuxCNC in a file: `loadrt {component} state_file=/FOLDER/{name}.state` in `{name}.hal`. It is written
-when LinuxCNC ends, and read and removed when it starts; the clock of the computer gives the time between. After a
-power failure there is no file. Pins: `told-cold`; `rezero` (rising edge) with `rezero-target` (K) and `measured` [mm];
+The state outlasts LinuxCNC in a file: `loadrt {component} state_file=/FOLDER/{name}.state` in `{name}.hal`. It is
+written when LinuxCNC ends, and read and removed when it starts; the clock of the computer gives the time between. After
+a power failure there is no file. Pins: `told-cold`; `rezero` (rising edge) with `rezero-target` (K) and `measured`
+[mm].
 `halcmd setp {hal}.told-cold 1` tells it cold from a terminal, if the pin is not connected.
 
 ## Readings

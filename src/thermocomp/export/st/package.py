@@ -32,7 +32,7 @@ Generate blocks from source; do the same for `{name}_test.scl`. For S7-1500 only
 _RETAIN: dict[Dialect, str] = {
     "codesys": "Declare `kept` where the block is called: `VAR RETAIN kept : {name}_state; END_VAR`, or in a list of "
     "persistent variables, which also outlasts a download.",
-    "twincat": "Declare `kept` where the block is called: `VAR PERSISTENT kept : {name}_state; END_VAR` (with a UPS, or "
+    "twincat": "Declare `kept` where the block is called: `VAR PERSISTENT kept : {name}_state; END_VAR` (with a UPS; "
     "`VAR RETAIN` with NOVRAM).",
     "scl": 'Declare `kept : "{name}_state"` in a global data block with optimized access and mark it *Retain*.',
 }
@@ -87,9 +87,9 @@ Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds.
 {power}
 
 {retain} Every ten seconds the block copies its state to `kept`, with a check value and the number of its models;
-{kilobytes} kB must be retained. Give `off_time` from the controller's clock: keep the time of the last cycle in a retained
-variable, too, and do not call the block before the clock is valid. If the corrections in force were lost with the power,
-move to `correction` from 0 before the axes are referenced, or at the machine's own rate.
+{kilobytes} kB must be retained. Give `off_time` from the controller's clock: keep the time of the last cycle in a
+retained variable, too, and do not call the block before the clock is valid. Apply `correction` before the axes are
+referenced.
 
 {about}## Test the sign
 

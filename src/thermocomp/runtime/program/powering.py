@@ -64,7 +64,7 @@ def obey(s: Kept, w: Work, t: Constants, k: Whole) -> None:
 
 
 def collect_offsets(s: Kept, w: Work, t: Constants, g: Whole, value: Callable[[Whole], Number]) -> None:
-    """Record the statements that find the offset of the day: the median of inputs of a model from those of the training.
+    """Record the statements that find the offset of the day: the median of the inputs of a model, less the training.
 
     Parameters
     ----------
