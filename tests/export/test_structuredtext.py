@@ -1,6 +1,8 @@
 """Structured text: parsed by blark, types checked, run over readings, and the same as the compensator."""
 
+import copy
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,6 +130,37 @@ def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[Sourc
         assert list(fresh.call(**again, **none).status) == list(machine.memory.status)
     assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
     assert moved[-1] == fresh.memory.correction[0]
+
+
+def test_a_kept_state_counts_unless_it_is_damaged_or_of_other_models(machine: Machine) -> None:
+    given = {"value": [21.0, 20.5, 20.0, 0.0], "good": [True] * 4, "age": 0.0, "elapsed": 10.0, "reading": 0.0}
+    machine.start()
+    assert machine.call(**given, **stmachine.happening(NOTHING, 0.0)).status[0] == 5
+    for k in range(40):
+        told = machine.call(**given, **stmachine.happening(NOTHING, 0.0) | {"cold": k >= 2})
+        assert told.status[0] == (5 if k < 2 else 0 if k < 32 else 1)
+    kept = copy.deepcopy(machine.memory.kept)
+
+    def on(off: float, change: Callable[[Any], Any] = lambda _: None) -> int:
+        machine.start()
+        machine.memory.kept = copy.deepcopy(kept)
+        change(machine.memory.kept)
+        return int(machine.call(**given, **stmachine.happening(NOTHING, off)).status[0])
+
+    assert (on(60.0), on(0.0), on(-1.0), on(1e31)) == (1, 5, 5, 5)
+    assert (on(86400.0), on(86401.0)) == (1, 0)  # longer than its longest time constant, too
+    for name, value in vars(kept).items():
+        one = value[-1] if isinstance(value, list) else value
+        other = not one if isinstance(one, bool) else one + 1
+
+        def change(of: Any, name: str = name, other: Any = other) -> None:
+            found = getattr(of, name)
+            if isinstance(found, list):
+                found[-1] = other
+            else:
+                setattr(of, name, other)
+
+        assert on(60.0, change) == 5, name
 
 
 @pytest.mark.long
