@@ -225,7 +225,9 @@ def make_readings(tables: Tables) -> Readings:
             add(machine.run(0.6, 15.0), 15.0)
     values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
     orders = np.array([events.get(k, (NOTHING, 0.0)) for k in range(len(rows))])
-    return Readings(values, ages, steps, counters, orders[:, 0].astype(int), orders[:, 1])
+    return Readings(
+        values=values, age=ages, dt=steps, counter=counters, event=orders[:, 0].astype(int), amount=orders[:, 1]
+    )
 
 
 def _switched(tables: Tables) -> list[tuple[int, float, int]]:

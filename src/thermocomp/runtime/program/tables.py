@@ -123,7 +123,6 @@ def gather(compensator: Compensator) -> Tables:
         "set_begin": np.cumsum([0, *(len(s) for s in sets)]).tolist(),
         "set_range": [ranges.index(i) for s in sets for i in s],
         "model_rezeroed": [any(i.rezero for i in m.inputs) for m in models],
-        "cold_after": find_cold_after(compensator),
         **_lines(compensator),
         **_feed(compensator, place),
         **_judged(models, sensors),
@@ -135,7 +134,6 @@ def gather(compensator: Compensator) -> Tables:
         formulas.add(name, [(k, m, formula(m, ranges)) for k, m in mine])
     own_sizes, own_values = formulas.finish()
     values |= own_values
-    values["fingerprint"] = _fingerprint(values, formulas.functions)
     sizes = {
         "CHANNELS": len(channels),
         "RANGES": len(ranges),
@@ -156,7 +154,7 @@ def gather(compensator: Compensator) -> Tables:
         targets=tuple(lines),
         models=models,
         sizes=sizes,
-        values=values,
+        values=values | {"fingerprint": _fingerprint(values, formulas.functions)},
         formulas=formulas.functions,
     )
 
@@ -244,6 +242,7 @@ def _lines(compensator: Compensator) -> dict[str, Any]:
         "travel_low": [low for low, _ in travels],
         "travel_high": [high for _, high in travels],
         "shadow": [t in compensator.shadow for t in compensator.lines],
+        "cold_after": find_cold_after(compensator),
     }
 
 
