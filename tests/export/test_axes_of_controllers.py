@@ -63,7 +63,7 @@ def taken(source: PositionModel, temperature: float, dialect: Any, what: Any, di
     block = Machine(translate(tables, "tc_x", "codesys"))
     values = Machine([write_values("tc_x_nc", "codesys", find_drives(tables, {"EXX": "X"}), what, direction)])
     for _ in range(2):
-        said = block.call(value=[temperature], good=[True], age=0.0, elapsed=1.0, restart=False)
+        said = block.call(value=[temperature], good=[True], age=0.0, elapsed=1.0, cold=True)
     return values.call(correction=list(said.correction), slope=list(said.slope), direction=direction)
 
 

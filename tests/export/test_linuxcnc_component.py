@@ -35,7 +35,9 @@ def make(tmp_path: Path) -> Make:
     def made(*models: ErrorModel | PositionModel, limits: Limits = Limits()) -> HalStand:
         for file, text in write_package(Compensator.of(list(models), limits), "mill", FACTS).items():
             (tmp_path / file).write_bytes(text)
-        return HalStand(tmp_path)
+        stand = HalStand(tmp_path)
+        stand["told-cold"] = True
+        return stand
 
     return made
 

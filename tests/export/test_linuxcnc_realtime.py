@@ -95,7 +95,8 @@ def test_in_a_real_thread_it_is_the_compensator() -> None:
             calls.append(([given[0] if fine else math.nan, given[1]], 1e-9 * since if fresh else 1e9, 1e-9 * waited))
             at.append(k)
             waited, fresh = 0, False
-    wanted = replay(compensator, tables, Readings(*(np.array(c, dtype=np.float64) for c in zip(*calls, strict=True))))
+    values_, ages, steps = (np.array(c, dtype=np.float64) for c in zip(*calls, strict=True))
+    wanted = replay(compensator, tables, Readings(values_, ages, steps))
     assert len(calls) == PERIODS * PERIOD // SECOND
     assert np.abs(1e-6 * found[at, :2] - wanted.correction).max() < 1e-9
     assert (found[at, 2] == wanted.status[:, 0]).all()

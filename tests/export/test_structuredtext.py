@@ -1,12 +1,15 @@
 """Structured text: parsed by blark, types checked, run over readings, and the same as the compensator."""
 
+import copy
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import stmachine
 from blark.parse import parse
 from driftmodels import ACCEPTED
 from hypothesis import HealthCheck, Phase, example, given, settings
@@ -23,7 +26,7 @@ from thermocomp.export.st.package import write_package
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.ststatements import RESERVED
 from thermocomp.export.st.sttest import write_test
-from thermocomp.export.vectors import Readings, make_readings, replay
+from thermocomp.export.vectors import NOTHING, TOLD_COLD, Readings, make_readings, replay
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
@@ -58,7 +61,7 @@ def machine(units: list[SourceUnit]) -> Machine:
 
 def test_it_says_what_the_compensator_says(watched: Compensator) -> None:
     said = check_block(watched, make_readings(gather(watched)))
-    assert set(said.status.ravel()) == {0, 1, 2, 3}
+    assert set(said.status.ravel()) == {0, 1, 2, 3, 5}
     assert {0, 1} <= set(said.fault.ravel())
 
 
@@ -108,22 +111,56 @@ def test_its_own_test_finds_a_mistake(
 def test_a_restart_moves_nothing_at_once(watched: Compensator, units: list[SourceUnit]) -> None:
     tables, machine = gather(watched), Machine(units)
     readings = make_readings(tables)
-    warm = Readings(readings.values[:165], readings.age[:165], readings.dt[:165])
+    warm = Readings(
+        readings.values[:165], readings.age[:165], readings.dt[:165]
+    )  # and none of the events but the first
     run(machine, warm, 1, len(tables.sensors))
     before = machine.memory.correction[0]
     assert abs(before) > 5.0
     values = [float(v) for v in readings.values[164]]
-    again = {"value": values, "good": [True] * len(values), "age": 0.0, "elapsed": 10.0}
-    said = machine.call(**again, restart=True)
+    again = {"value": values, "good": [True] * len(values), "age": 0.0, "elapsed": 10.0, "reading": 0.0}
+    none, told = (stmachine.happening(event, 0.0) for event in (NOTHING, TOLD_COLD))
+    said = machine.call(**again, **told)
     assert said.status[0] == 0
     assert said.correction[0] == before
     fresh, moved = Machine(units), [before]
-    fresh.call(**again, restart=False)
+    fresh.call(**again, **told)
     for _ in range(200):
-        moved.append(machine.call(**again, restart=False).correction[0])
-        assert list(fresh.call(**again, restart=False).status) == list(machine.memory.status)
+        moved.append(machine.call(**again, **none).correction[0])
+        assert list(fresh.call(**again, **none).status) == list(machine.memory.status)
     assert (np.abs(np.diff(moved)) <= 0.5 + 1e-9).all()
     assert moved[-1] == fresh.memory.correction[0]
+
+
+def test_a_kept_state_counts_unless_it_is_damaged_or_of_other_models(machine: Machine) -> None:
+    given = {"value": [21.0, 20.5, 20.0, 0.0], "good": [True] * 4, "age": 0.0, "elapsed": 10.0, "reading": 0.0}
+    machine.start()
+    assert machine.call(**given, **stmachine.happening(NOTHING, 0.0)).status[0] == 5
+    for k in range(40):
+        told = machine.call(**given, **stmachine.happening(NOTHING, 0.0) | {"cold": k >= 2})
+        assert told.status[0] == (5 if k < 2 else 0 if k < 32 else 1)
+    kept = copy.deepcopy(machine.memory.kept)
+
+    def on(off: float, change: Callable[[Any], Any] = lambda _: None) -> int:
+        machine.start()
+        machine.memory.kept = copy.deepcopy(kept)
+        change(machine.memory.kept)
+        return int(machine.call(**given, **stmachine.happening(NOTHING, off)).status[0])
+
+    assert (on(60.0), on(0.0), on(-1.0), on(1e31)) == (1, 5, 5, 5)
+    assert (on(86400.0), on(86401.0)) == (1, 0)  # longer than its longest time constant, too
+    for name, value in vars(kept).items():
+        one = value[len(value) - 1] if isinstance(value, list) else value
+        other = not one if isinstance(one, bool) else one + 1
+
+        def change(of: Any, name: str = name, other: Any = other) -> None:
+            found = getattr(of, name)
+            if isinstance(found, list):
+                found[len(found) - 1] = other
+            else:
+                setattr(of, name, other)
+
+        assert on(60.0, change) == 5, name
 
 
 @pytest.mark.long

@@ -33,13 +33,29 @@ _DRIVER = """
 void *begin(void) {{ {name}_state *s = malloc(sizeof *s); {name}_start(s); return s; }}
 void end(void *s) {{ free(s); }}
 
+void happen({name}_state *s, int event, double amount)
+{{
+    {name}_saved saved;
+
+    if (event == 1 || event == 2) {{
+        {name}_save(s, &saved);
+        saved.state.correction[0] += event == 2;
+        {name}_power_up(s, &saved, amount);
+    }} else if (event == 3) {{
+        {name}_cold(s);
+    }} else if (event > 3) {{
+        {name}_rezero(s, event - 4, amount);
+    }}
+}}
+
 void run(void *at, int n, const tc_real *values, const double *age, const double *dt, const double *counter,
-         double *said, int *told)
+         const double *event, const double *amount, double *said, int *told)
 {{
     {name}_state *s = at;
     int k, j;
 
     for (k = 0; k < n; k++) {{
+        happen(s, (int)event[k], amount[k]);
         {name}_step_counted(s, values + k * {n}, age[k], dt[k], counter[k]);
         for (j = 0; j < {targets}; j++) {{
             *said++ = s->correction[j];
@@ -54,6 +70,7 @@ void run(void *at, int n, const tc_real *values, const double *age, const double
         }}
         *told++ = s->rejected;
         *told++ = s->outside;
+        *told++ = s->warm;
     }}
 }}
 """
@@ -108,10 +125,10 @@ class CompiledBlock:
         """Run it from the start."""
         _, targets, models, sensors = self._shape
         n = len(readings.age)
-        said, told = np.empty((n, 2 * targets + models)), np.empty((n, targets + sensors + 2), dtype=np.int32)
+        said, told = np.empty((n, 2 * targets + models)), np.empty((n, targets + sensors + 3), dtype=np.int32)
         given = np.ascontiguousarray(readings.values, dtype=self._real)
-        age, dt, counter = (np.ascontiguousarray(a) for a in readings.columns[:, -3:].T)
-        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, age, dt, counter, said, told)]
+        orders = [np.ascontiguousarray(a) for a in readings.columns[:, -5:].T]
+        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (given, *orders, said, told)]
         state = ctypes.c_void_p(self._library.begin())
         self._library.run(state, n, *pointers)
         self._library.end(state)
@@ -121,7 +138,8 @@ class CompiledBlock:
             told[:, :targets].astype(int),
             said[:, 2 * targets :],
             told[:, targets : targets + sensors].astype(int),
-            told[:, -2] == 0,
+            told[:, -3] == 0,
+            told[:, -1] != 0,
         )
 
 
@@ -129,6 +147,7 @@ def check_same(one: Answers, other: Answers, within: float = 1e-12) -> None:
     """Compare what two said: decisions exactly, numbers to a share of their size."""
     assert (one.passed == other.passed).all()
     assert (one.status == other.status).all()
+    assert (one.warm == other.warm).all()
     assert (one.fault == other.fault).all()
     for a, b in ((one.correction, other.correction), (one.slope, other.slope), (one.deviation, other.deviation)):
         assert np.isfinite(b).all()

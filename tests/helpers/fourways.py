@@ -18,7 +18,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.st.structuredtext import translate as translate_st
-from thermocomp.export.vectors import STATUS
+from thermocomp.export.vectors import NOTHING, STATUS, TOLD_COLD
 from thermocomp.judging.compiled.intermediate import write_functions
 from thermocomp.judging.compiled.machine import compile_module
 from thermocomp.live import statefile
@@ -145,6 +145,7 @@ class MachineCode:
         value, age, dt, counter = (memory.find("w", name) for name in ("value", "age", "dt", "counter"))
         seen = [[memory.find("s", name).reshape(-1) for name in group] for group in (DECISIONS, NUMBERS)]
         kept = [memory.find("s", name) for name in ("correction", "slope")]
+        memory.find("s", "referenced")[:] = 1
         decisions, numbers = [], []
         for k in range(len(stream.dt)):
             if stream.restarts[k]:
@@ -152,6 +153,7 @@ class MachineCode:
                 memory.arrays["sr"][:], memory.arrays["si"][:] = 0.0, 0
                 for array, was in zip(kept, in_force, strict=True):
                     array[:] = was
+                memory.find("s", "referenced")[:] = 1
             value[:], age[...], dt[...] = stream.values[k], stream.age[k], stream.dt[k]
             counter[...] = stream.counter[k]
             self._step(*pointers)
@@ -170,14 +172,10 @@ void run(int n, const tc_real *values, const double *age, const double *dt, cons
     int k, j;
 
     {name}_start(&s);
+    {name}_cold(&s);
     for (k = 0; k < n; k++) {{
         if (restarts[k]) {{
-            {name}_state before = s;
-            {name}_start(&s);
-            for (j = 0; j < {targets}; j++) {{
-                s.correction[j] = before.correction[j];
-                s.slope[j] = before.slope[j];
-            }}
+            {name}_cold(&s);
         }}
         {name}_step_counted(&s, values + k * {channels}, age[k], dt[k], counter[k]);
         for (j = 0; j < {targets}; j++) {{ *decisions++ = s.status[j]; }}
@@ -226,10 +224,9 @@ class StructuredText:
     def run(self, stream: Stream) -> Said:
         """Run it from the start."""
         self._machine.start()
-        decisions, numbers, again = [], [], False
+        decisions, numbers, first = [], [], True
         rows = (stream.values, stream.age, stream.dt, stream.counter, stream.restarts)
         for values, age, dt, counter, restarts in zip(*rows, strict=True):
-            again = bool(restarts)
             good = np.isfinite(values)
             given = {
                 "value": np.where(good, values, 0.0).tolist(),
@@ -238,7 +235,8 @@ class StructuredText:
                 "elapsed": stmachine.finite(dt),
                 "reading": float(counter),
             }
-            seen = self._machine.call(**given, restart=again)
+            seen = self._machine.call(**given, **stmachine.happening(TOLD_COLD if restarts or first else NOTHING, 0.0))
+            first = False
             decisions.append(np.concatenate([np.ravel(getattr(seen, name)) for name in self._decisions]))
             numbers.append(np.concatenate([np.ravel(getattr(seen.s, name)) for name in NUMBERS]))
         return Said(np.array(decisions, dtype=np.int64), np.array(numbers))

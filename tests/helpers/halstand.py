@@ -44,6 +44,7 @@ _STAND = """
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static struct { char name[HAL_NAME_LEN + 1]; void *at; } pins[1000];
 static int count;
@@ -86,6 +87,14 @@ void *find(const char *name)
     for (k = 0; k < count; k++) if (!strcmp(pins[k].name, name)) return pins[k].at;
     return NULL;
 }
+long later;
+time_t time(time_t *at)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    if (at) *at = now.tv_sec + later;
+    return now.tv_sec + later;
+}
 void run(int periods, long period) { while (periods--) function(instance, period); }
 """
 
@@ -97,17 +106,31 @@ class HalStand:
     ----------
     folder : Path
         With its files; what is made of them goes there, too.
+    state_file : str
+        Parameter of the component; empty: none.
+    ago : int
+        So many seconds more have passed since the file was written.
     """
 
-    def __init__(self, folder: Path) -> None:
+    _count = 0
+
+    def __init__(self, folder: Path, state_file: str = "", ago: int = 0) -> None:
         comp = next(folder.glob("*.comp"))
         subprocess.run(["halcompile", "--preprocess", comp.name], cwd=folder, check=True)
         (folder / "stand.c").write_text(_STAND, encoding="ascii")
         common = ["gcc", "-shared", "-fPIC", *HOUSE, "-I."]
         subprocess.run([*common, *STRICT, "-c", f"{comp.stem}.c", "-o", "made.o"], cwd=folder, check=True)
-        line = [*common, "stand.c", "made.o", "-fsanitize=undefined", "-lm", "-o", f"{comp.stem}.so"]
+        HalStand._count += 1  # a library is loaded once by its name
+        made = folder / f"{comp.stem}{HalStand._count}.so"
+        line = [*common, "stand.c", "made.o", "-fsanitize=undefined", "-lm", "-o", made.name]
         subprocess.run(line, cwd=folder, check=True)
-        self._library = ctypes.CDLL(str(folder / f"{comp.stem}.so"))
+        self._library = ctypes.CDLL(str(made))
+        self._file = ctypes.create_string_buffer(state_file.encode())
+        if state_file:
+            at = ctypes.c_void_p.in_dll(self._library, "rtapi_info_address_state_file").value
+            assert at
+            ctypes.c_void_p.from_address(at).value = ctypes.addressof(self._file)
+        ctypes.c_long.in_dll(self._library, "later").value = ago
         self._library.find.restype = ctypes.c_void_p
         self._name = comp.stem.replace("_", "-")
         assert self._library.rtapi_app_main() == 0
@@ -124,6 +147,10 @@ class HalStand:
         assert at, f"no pin {pin}"
         kind = self._types.get(pin) or self._types[pin.rstrip("0123456789") + "#"]
         return TYPES[kind].from_address(at)
+
+    def exit(self) -> None:
+        """End as LinuxCNC does when it unloads the component."""
+        self._library.rtapi_app_exit()
 
     def run(self, periods: int, period: int = 1_000_000) -> None:
         """Let periods of the servo thread [ns] pass."""

@@ -4,6 +4,7 @@ No value is converted unless the text says so, both sides of AND and OR are work
 number of 32 bits that overflows and a variable that is read before it is set are errors.
 """
 
+import copy
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from blark import transform as b
 from stparsing import PYTHON, Array, Block, Piece, Type, block_of, declared
 
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit, translate
-from thermocomp.export.vectors import Answers, Readings, replay
+from thermocomp.export.vectors import DAMAGED, RETAINED, REZERO, TOLD_COLD, Answers, Readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 
@@ -39,6 +40,7 @@ class Machine:
             "Array": Array,
             "SEL": lambda g, one, other: other if g else one,
             "TRUNC": _trunc,
+            "COPY": _copy,
             **_NUMBERS,
         }
         for block in blocks:
@@ -53,7 +55,9 @@ class Machine:
     def _memory(self, block: str) -> SimpleNamespace:
         """Return an instance of a function block."""
         head = self._heads[block]
-        return SimpleNamespace(**{n: self._new(k) for part in ("in", "out", "own") for n, k in head[part].items()})
+        return SimpleNamespace(
+            **{n: self._new(k) for part in ("in", "inout", "out", "own") for n, k in head[part].items()}
+        )
 
     def _new(self, kind: Type) -> Any:
         if isinstance(kind, tuple):
@@ -79,9 +83,18 @@ class Machine:
             return {**self._heads[struct]["in"], **self._heads[struct]["out"]}[member]
         return self._structs[struct][member][0]
 
+    def is_struct(self, kind: Type) -> bool:
+        """Return whether a type is a structure."""
+        return kind in self._structs
+
     def head(self, name: str) -> dict[str, Any]:
         """Return what a function takes and gives."""
         return self._heads[name]
+
+
+def _copy(to: SimpleNamespace, of: SimpleNamespace) -> None:
+    for name, value in vars(copy.deepcopy(of)).items():
+        setattr(to, name, value)
 
 
 def _trunc(value: float) -> int:
@@ -137,20 +150,25 @@ class _Function:
         """Return a call of an instance of a function block."""
         name, kind = self._value(s.name)
         head = self._machine.head(kind)
-        assert [self._named(p.name) for p in s.parameters] == list(head["in"]), s
+        given = {**head["in"], **head["inout"]}
+        assert [self._named(p.name) for p in s.parameters] == list(given), s
         lines = []
-        for p, (parameter, wanted) in zip(s.parameters, head["in"].items(), strict=True):
+        for p, (parameter, wanted) in zip(s.parameters, given.items(), strict=True):
             value = self._as(p.value, wanted)
             lines.append(f"{pad}{name}.{parameter} = {f'Array({value})' if isinstance(wanted, tuple) else value}")
         return [*lines, f"{pad}{kind}({name})"]
 
-    def _statement(self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int) -> list[str]:
+    def _statement(  # noqa: PLR0911 - a case for every kind of statement
+        self, s: Any, bodies: Sequence[Sequence[Piece]], depth: int
+    ) -> list[str]:
         pad = "    " * depth
         match s:
             case b.AssignmentStatement():
                 target, kind = self._value(s.variables[0])
                 value, given = self._value(s.expression)
                 assert kind == given, f"{s}: {given} for {kind}"
+                if self._machine.is_struct(kind):
+                    return [f"{pad}COPY({target}, {value})"]
                 return [f"{pad}{target} = {value}"]
             case b.IfStatement():
                 tests = [s.if_expression, *(other.if_expression for other in s.else_ifs)]
@@ -259,23 +277,38 @@ def finite(value: float) -> float:
     return float(value) if np.isfinite(value) else NOTHING
 
 
+def happening(event: float, amount: float) -> dict[str, Any]:
+    """Return the inputs of a block for what happens before a call; see `thermocomp.export.vectors`."""
+    return {
+        "off_time": float(amount),
+        "cold": False,
+        "restart": event == TOLD_COLD,
+        "rezero": event >= REZERO,
+        "target": int(event) - REZERO,
+        "remaining": float(amount),
+        "first": event in (RETAINED, DAMAGED),
+    }
+
+
 def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Answers:
     """Call a block with readings; what is not a number is not good."""
-    said, told, found, passed = [], [], [], []
-    for *values, age, dt, counter in readings.columns.tolist():
+    said, told, found, passed, warm = [], [], [], [], []
+    for *values, age, dt, counter, event, amount in readings.columns.tolist():
         good = [bool(np.isfinite(v)) for v in values]
+        machine.memory.kept.correction[0] += float(event == DAMAGED)
         seen = machine.call(
             value=[float(v) if g else 0.0 for v, g in zip(values, good, strict=True)],
             good=good,
             age=finite(age),
             elapsed=finite(dt),
             reading=counter,
-            restart=False,
+            **happening(event, amount),
         )
         said.append([*seen.correction, *seen.slope])
         told.append(list(seen.status))
         found.append(list(seen.fault) if sensors else [])
         passed.append(seen.rejected == 0)
+        warm.append(seen.warm)
     table = np.array(said)
     return Answers(
         table[:, :targets],
@@ -284,6 +317,7 @@ def run(machine: Machine, readings: Readings, targets: int, sensors: int) -> Ans
         np.empty((len(told), 0)),
         np.array(found, dtype=int).reshape(len(found), -1),
         np.array(passed),
+        np.array(warm),
     )
 
 
@@ -291,6 +325,7 @@ def check_same(expected: Answers, said: Answers) -> None:
     """Compare decisions exactly, numbers to 1e-9 of their size."""
     assert (expected.passed == said.passed).all()
     assert (expected.status == said.status).all()
+    assert (expected.warm == said.warm).all()
     assert (expected.fault == said.fault).all()
     for one, other in ((expected.correction, said.correction), (expected.slope, said.slope)):
         assert (np.abs(one - other) <= 1e-9 * np.maximum(1.0, np.abs(one))).all()

@@ -61,6 +61,28 @@ def find_offsets(inputs: Sequence[Input], zero: Sequence[float], thresholds: Thr
     return {name: o - day for name, o in own.items() if open_ or abs(o - day) > thresholds.start_reported}
 
 
+#: of a machine that seems warm: offsets above this [degC], of more than one temperature and more than this share
+WARM, WARM_SHARE = 1.0, 8
+
+
+def seems_warm(inputs: Sequence[Input], zero: Sequence[float], averaged: Sequence[float]) -> bool:
+    """Return whether a machine at its start seems warm, by its temperatures compared with the training: a hint only.
+
+    Several of them have to be off the others: air and enclosure are on cold machines, too.
+
+    Parameters
+    ----------
+    zero, averaged : sequence of float of shape (n_inputs,)
+        Zero of the inputs, nan while unknown; then its readings so far, empty before the first one.
+    """
+    known = [z if math.isfinite(z) else averaged[k] if averaged else z for k, z in enumerate(zero)]
+    own = [z - i.reference for i, z in zip(inputs, known, strict=True) if i.rezero and i.quantity == "temperature"]
+    if not own or not all(map(math.isfinite, own)):
+        return False
+    day = find_day(own, THRESHOLDS.zero_change)
+    return sum(abs(offset - day) > WARM for offset in own) > max(1, len(own) // WARM_SHARE)
+
+
 def may_be_right(off: Sequence[float], count: int, most: float) -> bool:
     """Return whether those of `count` temperatures that are off the others may be right, and the others off.
 

@@ -3,6 +3,24 @@
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables
 
+_POWER = """The temperatures of a warm machine must not become the zero. After a power-up, or a download,
+`{of}status[k]` is 5 (reference unknown) and the corrections are 0, until one of these:
+
+1. **A retained state continues**, if it is undamaged, of the same models, and the time without power is given: more
+   than 0 and at most {day:g} h. The slow states of the models move on by this time, with the present inputs. After more
+   than {hold:g} s without power the corrections take their new values at once, as no axis is referenced yet; otherwise
+   they continue from the retained ones.
+2. **The machine was off for more than {cold:.1f} h**: it is cold, and starts by itself.
+3. **It is told cold**: by a person, or by a signal that is TRUE on a cold machine only. The temperatures from then on
+   become the zero, {wait}.
+4. **A correction is re-zeroed**: with the deviation (actual minus commanded) that a probe measures, or with 0 if the
+   datums were set anew on the machine as it is. It takes effect once the temperatures are averaged, {wait}. A speed
+   whose heat the monitoring misses, since the machine is warm already, holds the correction again: best measure with
+   the spindle stopped.
+
+`{of}warm` says that the temperatures of the start look like those of a warm machine: a hint for the operator's
+message, not reliable enough to decide."""
+
 
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:
     """Return the parts of the instruction page as text, by name."""
@@ -39,9 +57,17 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         "correction:\nthe axis must move by 0.02 mm in its positive direction, and back with 0. If it moves the other "
         "way, reverse the sign\nwhere the correction is sent to the controller, nowhere else. Do not test with made-up "
         "temperatures: the sensor\nmonitoring rejects them.",
+        "power": _POWER.format(
+            of=of,
+            hold=compensator.limits.hold,
+            day=float(tables.values["resumable"]) / 3600.0,
+            cold=float(tables.values["cold_after"]) / 3600.0,
+            wait=f"within {zeroing.at_rest:g} s" if tables.sizes["has_zero"] else "at once",
+        ),
         "status": f"`{of}status[k]` is the state of a correction: 0 starts, 1 active, 2 holding, 3 fading, 4 shadow "
-        f"(computed, not applied).\n`{of}rejected` is the reason why a reading was not used: 0 it was used, 1 its "
-        "time, 2 a missing or implausible value,\n3 temperatures that do not fit the start of a machine, 4 the source "
+        f"(computed, not applied), 5\nits reference is unknown (see below). `{of}rejected` is the reason why a reading "
+        "was not used: 0 it was used, 1 its time, 2 a\nmissing or implausible value, "
+        "3 temperatures that do not fit the start of a machine, 4 the source "
         "has stopped: all temperatures\nrepeat, or the number of the reading does not change. "
         f"`{of}outside` is the number of inputs beyond the trained range.",
         "sensors": sensors,

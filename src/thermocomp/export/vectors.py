@@ -19,14 +19,19 @@ from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.powerup import machine_seems_warm, power_up, rezero_measured, take_at_once
 from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.state import NO_ZERO, CompensatorState
 from thermocomp.runtime.watch import WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 #: values of `thermocomp.runtime.state.Status`, in the order of the block's status numbers
-STATUS = ("restarting", "active", "holding", "fading", "shadow")
+STATUS = ("restarting", "active", "holding", "fading", "shadow", NO_ZERO)
+#: what happens before a call: a power-up with the state retained at the call before, the same with a damaged one, an
+#: order that the machine is cold, an order to re-zero a target (the first one, the second one, ...)
+NOTHING, RETAINED, DAMAGED, TOLD_COLD, REZERO = range(5)
 
 
 class Readings(NamedTuple):
@@ -36,12 +41,16 @@ class Readings(NamedTuple):
     age: FloatArray  #: (n_calls,), age of the values [s]
     dt: FloatArray  #: (n_calls,), time since the previous call [s]
     counter: FloatArray | None = None  #: (n_calls,), number of the reading; None: readings are not numbered
+    event: IntArray | None = None  #: (n_calls,), from `NOTHING` to `REZERO`; None: told cold before the first call
+    amount: FloatArray | None = None  #: (n_calls,), time without power [s], or measured deviation [um]
 
     @property
     def columns(self) -> FloatArray:
-        """Return values, age, time step and number of the reading, (n_calls, n_channels + 3)."""
-        counter = np.zeros(len(self.age)) if self.counter is None else self.counter
-        return np.column_stack([self.values, self.age, self.dt, counter])
+        """Return values, age, time step, number of the reading, event and its amount, (n_calls, n_channels + 5)."""
+        none = np.zeros(len(self.age))
+        counter, amount = (none if a is None else a for a in (self.counter, self.amount))
+        event = np.where(np.arange(len(none)) == 0, TOLD_COLD, NOTHING) if self.event is None else self.event
+        return np.column_stack([self.values, self.age, self.dt, counter, event, amount])
 
 
 class Answers(NamedTuple):
@@ -53,6 +62,7 @@ class Answers(NamedTuple):
     deviation: FloatArray  #: (n_calls, n_models)
     fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watch.WORDS`
     passed: NDArray[np.bool_]  #: (n_calls,), whether the reading was used
+    warm: NDArray[np.bool_]  #: (n_calls,), whether the machine seemed warm at its start
 
 
 def replay(
@@ -62,15 +72,31 @@ def replay(
     *,
     rounded: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Answers:
-    """Replay readings through a compensator from its initial state and return its outputs."""
+    """Replay readings through a compensator from its power-up without a state, and return its outputs."""
     names, targets = [c.name for c in tables.channels], tables.targets
-    state, clock, begun, rows = compensator.start(), 0.0, False, []
-    for *values, age, dt, counter in readings.columns.tolist():
+    state, clock, begun, rows = power_up(compensator, None, math.nan), 0.0, False, []
+    warm, waiting, resumed = False, dict[str, float](), set[str]()
+    for *values, age, dt, counter, event, amount in readings.columns.tolist():
+        if REZERO <= event < REZERO + len(targets):
+            waiting[targets[int(event) - REZERO]] = amount
+        elif NOTHING < event < REZERO:
+            state = _begin(compensator, state, int(event), amount)
+            clock, begun = state.clock or 0.0, state.clock is not None
+            waiting, warm = (waiting, warm) if begun else ({}, False)
+            resumed = set(targets) if begun and amount > compensator.limits.hold else resumed if begun else set()
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
         tick = clock if good else math.nan  # an invalid clock advances nothing
         reading = Reading(tick - age, dict(zip(names, values, strict=True)), counter=counter)
+        starting = any(np.isnan(m.reference).any() for m in state.models)
+        before = state
         state, said = compensator.step(state, reading, tick)
+        state, said = take_at_once(compensator, before, state, said, resumed)
+        resumed = {t for t in resumed if said.states[t].word not in ("active", "shadow")}
+        if starting and not said.rejected:
+            warm = machine_seems_warm(compensator, state)
+        for target in [t for t in waiting if t in state.raw]:
+            state = rezero_measured(compensator, state, target, clock, waiting.pop(target))
         if rounded is not None:
             corrections = {t: round_all(c, rounded) for t, c in state.corrections.items()}
             state = state._replace(models=round_all(state.models, rounded), corrections=corrections)
@@ -82,13 +108,14 @@ def replay(
                 [float(s.deviation) for s in state.models],
                 [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors],
                 not said.rejected,
+                warm,
             )
         )
 
     def table(k: int) -> FloatArray:
         return np.array([r[k] for r in rows], dtype=np.float64).reshape(len(rows), -1)
 
-    passed = np.array([r[5] for r in rows], dtype=np.bool_)
+    passed, seemed = (np.array([r[k] for r in rows], dtype=np.bool_) for k in (5, 6))
     return Answers(
         correction=table(0),
         slope=table(1),
@@ -96,7 +123,15 @@ def replay(
         deviation=table(3),
         fault=table(4).astype(int),
         passed=passed,
+        warm=seemed,
     )
+
+
+def _begin(compensator: Compensator, state: CompensatorState, event: int, amount: float) -> CompensatorState:
+    """Return the state after a power-up, or after an order that the machine is cold: corrections are kept then."""
+    if event == TOLD_COLD:
+        return compensator.start()._replace(corrections=state.corrections)
+    return power_up(compensator, state if event == RETAINED else None, amount)
 
 
 #: parts of a model that are not exported: the judging results decide what is permitted and must not be rounded
@@ -140,9 +175,11 @@ def make_readings(tables: Tables) -> Readings:
     A start at rest, with two impossible speeds, and a warm-up at changing speeds; each value missing, erratic or
     impossible for a while; late, old or out-of-order readings; a source that stops until the corrections have faded to
     zero, and its return; sensors that stick, step and drift one after the other; values beyond the trained range; a
-    source that repeats its values, and one whose counter does not advance.
+    source that repeats its values, and one whose counter does not advance. It is told cold at first; at the end it is
+    switched off and on with a retained state, without one, and with one that cannot be used.
     """
-    machine, back = Warming(tables), tables.models[0].thresholds.return_time
+    machine = Warming(tables)
+    events: dict[int, tuple[int, float]] = {0: (TOLD_COLD, 0.0)}
     age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
     rng = np.random.default_rng(0)
     rows: list[tuple[FloatArray, float, float, float]] = []
@@ -157,13 +194,8 @@ def make_readings(tables: Tables) -> Readings:
     for k in range(120):
         dt = 60.0 if k % 3 else 12.0
         add(machine.run(_share(k), dt), dt, 0.25)
-    for c in range(len(machine.rest)):
-        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
-            values = machine.run(0.8, 15.0)
-            values[c] = wild
-            add(values, 15.0)
-        for _ in range(4):  # until the value is trusted again
-            add(machine.run(0.8, back / 3), back / 3)
+    events[len(rows)] = RETAINED, 1800.0
+    _damage(machine, add, tables.models[0].thresholds.return_time)
     _turn(machine, add, 30)
     warm = machine.run(0.8, 10.0)
     for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
@@ -187,8 +219,32 @@ def make_readings(tables: Tables) -> Readings:
     _turn(machine, add, 5)
     for k in range(12):
         add(machine.run(0.8, age / 3), age / 3, counter=7.0 + (k > 0) + max(k - 8, 0))  # the first shows nothing
+    for event, amount, calls in _switched(tables):
+        events[len(rows)] = event, amount
+        for _ in range(calls):
+            add(machine.run(0.6, 15.0), 15.0)
     values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
-    return Readings(values, ages, steps, counters)
+    orders = np.array([events.get(k, (NOTHING, 0.0)) for k in range(len(rows))])
+    return Readings(
+        values=values, age=ages, dt=steps, counter=counters, event=orders[:, 0].astype(int), amount=orders[:, 1]
+    )
+
+
+def _switched(tables: Tables) -> list[tuple[int, float, int]]:
+    """Return events of a controller that is switched off and on, with the number of calls after each."""
+    day, cold = float(tables.values["resumable"]), float(tables.values["cold_after"])
+    short = min(1800.0, 0.9 * cold)
+    return [
+        (RETAINED, 1800.0, 8),
+        (RETAINED, 0.0, 8),  # for an unknown time
+        (REZERO, -7.0, 6),
+        (RETAINED, 60.0, 3),
+        (DAMAGED, short, 4),
+        (TOLD_COLD, 0.0, 6),
+        (RETAINED, max(day, cold) + 1.0, 6),
+        (DAMAGED, short, 2),
+        (DAMAGED, 1.01 * cold, 6),
+    ]
 
 
 #: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit
@@ -198,6 +254,17 @@ _THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + 
 def _share(k: int) -> float:
     """Return the fraction of top speed at a step of a test."""
     return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
+
+
+def _damage(machine: Warming, add: Callable[[FloatArray, float], None], back: float) -> None:
+    """Make each value wild for a while, until it is trusted again."""
+    for c in range(len(machine.rest)):
+        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
+            values = machine.run(0.8, 15.0)
+            values[c] = wild
+            add(values, 15.0)
+        for _ in range(4):
+            add(machine.run(0.8, back / 3), back / 3)
 
 
 def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: int) -> None:

@@ -1,6 +1,5 @@
 """The slow states of new models on a warm machine: the journal's readings replayed from the zero that is taken over."""
 
-import math
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -8,12 +7,12 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import ThermocompError
-from thermocomp.core.expression import Lag, Node, PacedLag
 from thermocomp.core.inputs import Input
 from thermocomp.core.reading import Reading
 from thermocomp.live.journal.journalreader import JournalReader
 from thermocomp.live.storedzero import StateOfOthers, StoredZero
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.powerup import find_slowest
 from thermocomp.runtime.state import CompensatorState, Reference
 from thermocomp.runtime.watch import begin
 
@@ -46,20 +45,6 @@ def rebuild(compensator: Compensator, others: StateOfOthers, journal: Path | Non
 def _find_users(compensator: Compensator, name: str) -> str:
     users = [m.target for m in compensator.models if name in (i.name for i in m.inputs)]
     return f"the model of {' and '.join(users)}" if users else "sensor monitoring"
-
-
-def find_slowest(compensator: Compensator) -> float:
-    """Return the longest time constant of the models and watches [s]; infinite if a model forgets nothing."""
-
-    def slowest(node: Node) -> float:
-        if isinstance(node, Lag):
-            return node.time_constant
-        return max(node.stopped, node.running) if isinstance(node, PacedLag) else math.inf
-
-    own = [slowest(node) for m in compensator.models for node in m.remembered]
-    watched = [float(1.0 / rate) for w in compensator.watches for rate in w.bank.rates]
-    usual = [compensator.thresholds.difference_time] if compensator.watches else []
-    return max([*own, *watched, *usual], default=0.0)
 
 
 def _zeroed(compensator: Compensator, zero: StoredZero) -> CompensatorState:

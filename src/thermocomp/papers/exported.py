@@ -29,6 +29,7 @@ int main(void)
     int k;
 
     {name}_start(&s);
+    {name}_cold(&s);
     while (scanf("%lf", &dt) == 1) {{
         for (k = 0; k < {inputs} && scanf("%lf", &x) == 1; k++) {{
             value[k] = (tc_real)x;

@@ -40,8 +40,8 @@ CNC adds the value to the command (1) or subtracts it (-1). Test this with the s
 the axis: with P-AXIS-00273 at 200 and all other values at 0, the axis moves by +0.02 mm, or by -0.02 mm if the CNC
 subtracts the value.
 
-At power-on the block starts with corrections of 0: if the CNC retains the parameters, write 0 to them before the axes
-are homed.
+At power-up write the values of the block to the parameters before the axes are homed, also the 0 of a correction whose
+`status[k]` is 5.
 
 The CNC distributes a change over several of its cycles; here a correction changes by at most {rate:g} um/s.
 """

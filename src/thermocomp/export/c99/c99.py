@@ -26,14 +26,8 @@ extern "C" {{
 
 /* files compiled in different precisions do not link */
 #ifdef TC_FLOAT
-#define {name}_start {name}_start_float
-#define {name}_step {name}_step_float
-#define {name}_step_counted {name}_step_counted_float
-#else
-#define {name}_start {name}_start_double
-#define {name}_step {name}_step_double
-#define {name}_step_counted {name}_step_counted_double
-#endif
+{single}#else
+{double}#endif
 
 /* inputs, in this order */
 enum {{
@@ -49,8 +43,33 @@ enum {{
 typedef struct {{
 {state}}} {name}_state;
 
-/* Start: all corrections are zero. */
+/* state to be saved, as bytes, at every opportunity, and given back after a power-up */
+typedef struct {{
+    {name}_state state;
+    unsigned long model; /* to which models it belongs */
+    unsigned long check; /* of its bytes */
+}} {name}_saved;
+
+/* Start without a state: the reference is unknown, and all corrections stay zero; see {name}.md. */
 void {name}_start({name}_state *s);
+
+/* Save the state. */
+void {name}_save(const {name}_state *s, {name}_saved *saved);
+
+/*
+ * Start with a saved state (NULL: none) after `off` seconds without power (0: unknown).
+ * 0: it continues; 1: it starts, as the machine is cold after this time; 2: the reference is unknown.
+ */
+int {name}_power_up({name}_state *s, const {name}_saved *saved, double off);
+
+/* The machine is cold, or its datums are set anew: the next temperatures become the zero; corrections move on. */
+void {name}_cold({name}_state *s);
+
+/*
+ * A target continues from its correction minus the deviation (actual minus commanded) that was measured with the
+ * correction in force [um]; 0: its datum was set anew.
+ */
+void {name}_rezero({name}_state *s, int target, double remaining);
 
 /*
  * Read values, measured `age` seconds ago, and update the corrections; `dt` is the time since the previous call [s].
@@ -72,6 +91,9 @@ void {name}_step_counted({name}_state *s, const tc_real value[{n}], double age, 
 #endif
 """
 
+#: functions for the caller
+_CALLS = ("start", "save", "power_up", "cold", "rezero", "step", "step_counted")
+
 _REFUSED = """#ifdef TC_FLOAT
 #error "single precision is too coarse for this model: compile without -DTC_FLOAT"
 #endif
@@ -81,6 +103,7 @@ _REFUSED = """#ifdef TC_FLOAT
 _SOURCE = """{facts}#include "{name}.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #ifdef __FAST_MATH__
 #error "NaN would not be detected: compile without -ffast-math"
@@ -102,11 +125,74 @@ typedef struct {{
 
 {constants}
 {functions}
+/* return the check value (CRC-32) of a state */
+static unsigned long tc_crc(const {name}_state *s)
+{{
+    const unsigned char *byte = (const unsigned char *)s;
+    unsigned long crc = 0xFFFFFFFFUL;
+    size_t k;
+    int j;
+
+    for (k = 0; k < sizeof *s; k++) {{
+        crc ^= byte[k];
+        for (j = 0; j < 8; j++) {{
+            crc = (crc >> 1) ^ ((crc & 1UL) != 0UL ? 0xEDB88320UL : 0UL);
+        }}
+    }}
+    return crc;
+}}
+
 void {name}_start({name}_state *s)
 {{
-    static const {name}_state cold = {{0}};
+    static const {name}_state none = {{0}};
 
-    *s = cold;
+    *s = none;
+}}
+
+void {name}_save(const {name}_state *s, {name}_saved *saved)
+{{
+    saved->model = 0;
+    saved->state = *s;
+    saved->check = tc_crc(&saved->state);
+    saved->model = {fingerprint}UL;
+}}
+
+int {name}_power_up({name}_state *s, const {name}_saved *saved, double off)
+{{
+    {name}_work w;
+
+    {name}_start(s);
+    if (saved && saved->model == {fingerprint}UL && saved->check == tc_crc(&saved->state)) {{
+        *s = saved->state;
+    }}
+    tc_power_up(s, &w, (tc_real)off);
+    if (w.begins != 0) {{
+        {name}_start(s);
+    }}
+    if (w.begins == 1) {{
+        {name}_cold(s);
+    }}
+    return w.begins;
+}}
+
+void {name}_cold({name}_state *s)
+{{
+    const {name}_state before = *s;
+    int k;
+
+    {name}_start(s);
+    for (k = 0; k < {targets}; k++) {{
+        s->correction[k] = before.correction[k];
+        s->slope[k] = before.slope[k];
+        s->referenced[k] = 1;
+    }}
+}}
+
+void {name}_rezero({name}_state *s, int target, double remaining)
+{{
+    {name}_work w;
+
+    tc_rezero(s, &w, target, (tc_real)remaining);
 }}
 
 void {name}_step({name}_state *s, const tc_real value[{n}], double age, double dt)
@@ -160,16 +246,21 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
         work=write_variables(sizes, "w", functions + "w->value w->age w->dt w->counter"),
         constants=write_tables(tables, functions),
         functions=functions,
+        fingerprint=tables.values["fingerprint"],
+        targets=len(tables.targets),
     )
     header = _HEADER.format(
         name=name,
         n=n,
         facts=above,
+        **{p: "".join(f"#define {name}_{c} {name}_{c}_{p}\n" for c in _CALLS) for p in ("single", "double")},
         refused=_REFUSED if double_only else "",
         guard=f"{name.upper()}_H",
         inputs=_enumerated(name, "IN", [f"{c.name} [{c.unit}]" for c in tables.channels]),
         outputs=_enumerated(name, "OUT", [f"{t} [um]" for t in tables.targets]),
-        state=write_variables(sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside"),
+        state=write_variables(
+            sizes, "s", functions + "s->status s->correction s->rejected s->fault s->outside s->warm"
+        ),
     )
     return Sources(name, header, "".join(_wrapped(line) for line in source.splitlines(keepends=True)))
 

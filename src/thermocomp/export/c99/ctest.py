@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from thermocomp.export.vectors import Answers, Readings
 from thermocomp.runtime.program.tables import Tables
 
@@ -20,8 +22,12 @@ _PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 
 enum {{ CALLS = {calls}, INPUTS = {inputs}, TARGETS = {targets}, SENSORS = {sensors} }};
 
-/* values, their age [s], time since the previous call [s], number of the reading */
-static const double given[CALLS][INPUTS + 3] = {{
+/*
+ * values, their age [s], time since the previous call [s], number of the reading; what happens before the call: 1 off
+ * and on with the state of the call before, 2 the same with a damaged one, 3 told cold, 4... re-zero of a target; time
+ * without power [s], or measured deviation [um]
+ */
+static const double given[CALLS][INPUTS + 5] = {{
 {given}
 }};
 
@@ -30,8 +36,8 @@ static const double wanted[CALLS][2 * TARGETS] = {{
 {wanted}
 }};
 
-/* status by target, fault by sensor, and whether the reading was used */
-static const int told[CALLS][TARGETS + SENSORS + 1] = {{
+/* status by target, fault by sensor, whether the reading was used, whether the machine seemed warm */
+static const int told[CALLS][TARGETS + SENSORS + 2] = {{
 {told}
 }};
 
@@ -46,6 +52,21 @@ static int off(double value, double want)
     return !(apart <= TOLERANCE);
 }}
 
+static void happen({name}_state *s, int event, double amount)
+{{
+    static {name}_saved saved;
+
+    if (event == 1 || event == 2) {{
+        {name}_save(s, &saved);
+        saved.state.correction[0] += event == 2;
+        {name}_power_up(s, &saved, amount);
+    }} else if (event == 3) {{
+        {name}_cold(s);
+    }} else if (event > 3) {{
+        {name}_rezero(s, event - 4, amount);
+    }}
+}}
+
 int main(void)
 {{
     static {name}_state s;
@@ -57,8 +78,9 @@ int main(void)
         for (j = 0; j < INPUTS; j++) {{
             value[j] = (tc_real)given[k][j];
         }}
+        happen(&s, (int)given[k][INPUTS + 3], given[k][INPUTS + 4]);
         {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
-        wrong = (s.rejected == 0) != told[k][TARGETS + SENSORS];
+        wrong = (s.rejected == 0) != told[k][TARGETS + SENSORS] || s.warm != told[k][TARGETS + SENSORS + 1];
         for (j = 0; j < TARGETS; j++) {{
             wrong |= off((double)s.correction[j], wanted[k][2 * j]);
             wrong |= off((double)s.slope[j], wanted[k][2 * j + 1]);
@@ -92,6 +114,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         1 um; `single` is 0 if single precision is not supported.
     """
     calls = range(len(readings.age))
+    told = np.column_stack([answers.status, answers.fault, answers.passed, answers.warm]).astype(int)
     return _PROGRAM.format(
         name=name,
         double=double,
@@ -104,10 +127,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         wanted=_rows(
             [x for pair in zip(answers.correction[k], answers.slope[k], strict=True) for x in pair] for k in calls
         ),
-        told=",\n".join(
-            f"    {{{', '.join(map(str, [*answers.status[k], *answers.fault[k], int(answers.passed[k])]))}}}"
-            for k in calls
-        ),
+        told=",\n".join(f"    {{{', '.join(map(str, row))}}}" for row in told.tolist()),
         faults=_FAULTS if tables.sensors else "",
     )
 

@@ -41,14 +41,16 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
     #include <math.h>                          /* NAN */
 
     static {name}_state state;                 /* zero at power-on */
+    static {name}_saved saved;                 /* read from non-volatile memory; or NULL below */
     static tc_real value[{inputs}];
 
-    {name}_start(&state);                      /* once */
+    {name}_power_up(&state, &saved, off);      /* off: seconds without power, 0 if unknown */
     for (;;) {{                                 /* every dt seconds */
         /* fill value[] as below; NAN for a sensor without a reading */
         {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
         /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
         /* send state.correction[0] to the controller [um] */
+        {name}_save(&state, &saved);           /* and write its bytes, every ten seconds or when the power fails */
     }}
 
 {stopped}
@@ -63,6 +65,15 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
 
 {geometry}{zero} {status}{sensors}
 
+## At power-up
+
+{power}
+
+`{name}_save` fills a struct without pointers: write its bytes to non-volatile memory, with the time.
+`{name}_power_up` takes it back with the seconds since then, and returns 0 if it continues, 1 if the machine is cold by
+that time, 2 if the reference is unknown. A damaged struct (CRC-32) or one of other models counts as none, as does NULL.
+`{name}_cold(&state)` tells it cold; `{name}_rezero(&state, k, remaining)` re-zeroes a correction [um].
+
 ## Test the sign
 
 {sign}
@@ -70,8 +81,8 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
 ## Switch it off
 
 Do not set the correction to zero in one step: the axis would jump. Instead, call `{name}_step` with an age of 1e9: the
-correction is held for {hold:g} s and then decays slowly to zero. To restart, call `{name}_start` once the correction is
-zero. Do not use the controller's own temperature compensation at the same time.
+correction is held for {hold:g} s and then decays slowly to zero. Do not use the controller's own temperature
+compensation at the same time.
 """
 
 

@@ -19,6 +19,11 @@ pin in bit good-#[{inputs}] = TRUE;     /* FALSE for a sensor that reports a fai
 pin in u32 reading;              /* counter of readings: the values are new when it changes */
 pin in bit enable = TRUE;        /* FALSE: corrections are held, then decay to zero */
 
+pin in bit told-cold;            /* TRUE: the machine is cold; ignored once the reference is known */
+pin in bit rezero;               /* rising edge: correction-K continues from its value minus `measured` */
+pin in s32 rezero-target;        /* K */
+pin in float measured;           /* deviation (actual minus commanded) with the correction in force [mm] */
+
 pin in bit motion-enabled;       /* from the controller: external offsets can move only if TRUE */
 pin in bit all-homed;
 pin in bit coord-mode;
@@ -26,18 +31,24 @@ pin in bit teleop-mode;
 {axes}
 pin out float correction-#[{targets}];  /* [mm] */
 pin out float slope-#[{targets}];       /* [um/m] */
-pin out s32 status-#[{targets}];        /* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow */
+/* 0 starts, 1 active, 2 holding, 3 fading, 4 shadow, 5 its reference is unknown */
+pin out s32 status-#[{targets}];
 {faults}/* why a reading was not used: 0 it was used, 1 its time, 2 a value, 3 not a start, 4 the source has stopped */
 pin out s32 rejected;
 pin out s32 outside;             /* number of inputs beyond the trained range */
+pin out bit seems-warm;          /* at the start the temperatures were those of a warm machine: a hint */
 pin out float scale = {resolution!r};     /* one count of an external offset [machine units] */
 pin out bit engaged;             /* external offsets can move */
 param rw float unit = 1.0;       /* machine units per millimetre: 1, or 0.0393700787 for inches */
 
 function _ fp;
 option singleton yes;
+option extra_setup yes;
+option extra_cleanup yes;
 license "none";
 include "{name}.c";
+include <stdio.h>;
+include <time.h>;
 ;;
 #undef rejected
 #undef outside
@@ -52,7 +63,10 @@ enum {{ INPUTS = {inputs}, TARGETS = {targets} }};
 /* ends of the travel, from the reference position [mm]; equal: independent of position */
 static const double travel[TARGETS][2] = {{{travel}}};
 
-static {name}_state state; /* all zero: started */
+static {name}_state state; /* all zero: its reference is unknown */
+static char *state_file; /* read at the start and then removed; written when the component is unloaded */
+RTAPI_MP_STRING(state_file, "file for the state while LinuxCNC does not run");
+static int ordered;
 static double now[TARGETS][2]; /* corrections in force at both ends of the travel [um] */
 static double base[TARGETS]; /* offset in force when it was engaged [machine units] */
 static long sent[TARGETS]; /* counts sent since then */
@@ -98,6 +112,51 @@ static int lacking(int k, const double ends[2], double at, double request, int o
     return (int)lround(order);
 }}
 
+EXTRA_SETUP()
+{{
+    static struct {{ {name}_saved saved; time_t when; }} kept;
+    FILE *file = state_file ? fopen(state_file, "rb") : NULL;
+    const int known = file && fread(&kept, sizeof kept, 1, file) == 1;
+
+    (void)__comp_inst; (void)prefix; (void)extra_arg;
+    if (file) {{
+        fclose(file);
+        remove(state_file); /* LinuxCNC may end without writing it anew */
+    }}
+    {name}_power_up(&state, known ? &kept.saved : NULL, known ? difftime(time(NULL), kept.when) : 0.0);
+    return 0;
+}}
+
+EXTRA_CLEANUP()
+{{
+    static struct {{ {name}_saved saved; time_t when; }} kept;
+    FILE *file = state_file ? fopen(state_file, "wb") : NULL;
+
+    if (file) {{
+        {name}_save(&state, &kept.saved);
+        kept.when = time(NULL);
+        if ((fwrite(&kept, sizeof kept, 1, file) != 1) | (fclose(file) != 0)) {{
+            remove(state_file);
+        }}
+    }}
+}}
+
+static void obey(int told, int order, int target, double by)
+{{
+    int k, unknown = 0;
+
+    for (k = 0; k < TARGETS; k++) {{
+        unknown |= !state.referenced[k];
+    }}
+    if (told && unknown) {{
+        {name}_cold(&state);
+    }}
+    if (order && !ordered) {{
+        {name}_rezero(&state, target, 1000.0 * by);
+    }}
+    ordered = order;
+}}
+
 FUNCTION(_)
 {{
     const hal_u32_t count = reading;
@@ -118,6 +177,7 @@ FUNCTION(_)
         for (k = 0; k < INPUTS; k++) {{
             given[k] = good(k) ? (tc_real)value(k) : (tc_real)NAN;
         }}
+        obey(told_cold, rezero, rezero_target, measured);
         {name}_step(&state, given, fresh && enable ? 1e-9 * (double)since : 1e9, 1e-9 * (double)waited);
         fresh = 0;
         waited = 0;
@@ -128,6 +188,7 @@ FUNCTION(_)
         }}
 {told}        *__comp_inst->rejected = state.rejected;
         *__comp_inst->outside = state.outside;
+        seems_warm = state.warm;
     }}
     could = can;
     engaged = on;
@@ -148,6 +209,7 @@ _MOVE = """    {a}_counts += lacking({k}, travel[{k}], {at}, {a}_request, on, 1e
 """
 
 _HAL = """{facts}
+# For a state that outlasts LinuxCNC, FILL IN: loadrt {component} state_file=/FOLDER/{name}.state
 loadrt {component}
 addf {hal} servo-thread
 
@@ -159,13 +221,16 @@ setp {hal}.unit 1.0
 {sources}
 #net {hal}-reading SOURCE => {hal}.reading
 
-# 3. Whether an external offset may move. If your HAL connects one of these pins to a signal, use that signal here.
+# 3. Power-up: until the reference is known, nothing moves. Tell the machine cold from a button of the panel, or here:
+#setp {hal}.told-cold 1
+
+# 4. Whether an external offset may move. If your HAL connects one of these pins to a signal, use that signal here.
 net {hal}-enabled motion.motion-enabled => {hal}.motion-enabled
 net {hal}-homed motion.is-all-homed => {hal}.all-homed
 net {hal}-coord motion.coord-mode => {hal}.coord-mode
 net {hal}-teleop motion.teleop-mode => {hal}.teleop-mode
 
-# 4. Axes. Each needs OFFSET_AV_RATIO = 0.1 in its [AXIS_...] of the INI: otherwise nothing moves, without a message.
+# 5. Axes. Each needs OFFSET_AV_RATIO = 0.1 in its [AXIS_...] of the INI: otherwise nothing moves, without a message.
 {axes}
 """
 
@@ -235,6 +300,7 @@ def write_hal(tables: Tables, name: str, facts: Sequence[str], letters: Mapping[
     return _HAL.format(
         facts="".join(map(remark, facts)),
         component=name_component(name),
+        name=name,
         hal=hal,
         sources="\n".join(told),
         axes="\n".join(axes),

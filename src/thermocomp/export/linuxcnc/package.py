@@ -36,8 +36,7 @@ Its exit code is 0 if all agree. Step 6 below verifies the rest at the machine.
 
 1. `sudo apt-get install linuxcnc-uspace-dev`, and in this folder: `sudo halcompile --install {component}.comp`.
    Repeat this after an update of LinuxCNC. A warning that a frame is larger than 2560 bytes can be ignored: the
-   servo thread has a stack of 1 MB. The single call that computes the zero (reference temperatures), up to 300 s after
-   power-on, takes longer (0.4 ms on a desktop processor): home and cut only after it.
+   servo thread has a stack of 1 MB.
 2. Copy `{name}.hal` to the folder of the machine's INI file, and add as the last line of its section `[HAL]`:
    `HALFILE = {name}.hal`.
 3. Add `OFFSET_AV_RATIO = 0.1` to {sections}: the share of speed and
@@ -64,6 +63,18 @@ Its exit code is 0 if all agree. Step 6 below verifies the rest at the machine.
 {corrections}
 
 {zero} {status}{sensors}
+
+## At power-up
+
+{power}
+
+The state outlasts LinuxCNC in a file: `loadrt {component} state_file=/FOLDER/{name}.state` in `{name}.hal`. It is
+written when LinuxCNC ends, and read and removed when it starts; the clock of the computer gives the time between. After
+a power failure there is no file. Pins: `told-cold`; `rezero` (rising edge) with `rezero-target` (K) and `measured`
+[mm].
+`halcmd setp {hal}.told-cold 1` tells it cold from a terminal, if the pin is not connected.
+
+## Readings
 
 Each reading is used once: between readings `rejected` is 1 and `status-K` 2, and nothing moves.
 
@@ -101,6 +112,7 @@ def write_package(
     component = name_component(name)
     about = describe(compensator, tables)
     about["corrections"] = str(about["corrections"]).replace("[um]", "[mm]")  # the pins are in mm
+    about["power"] = str(about["power"]).replace("`warm`", "`seems-warm`")
     sections = [f"`[AXIS_{a}]`" for a in letters.values()]
     page = _README.format(
         facts="  \n".join(said),

@@ -44,8 +44,8 @@ command (-1, as in the vendor's worked example of a growing screw) or adds it (1
 referenced, the spindle stopped and a dial indicator on the axis: with `$SA_TEMP_COMP_ABS_VALUE` of the axis at 0.02
 and all other values at 0, the axis moves by +0.02 mm, or by -0.02 mm if the NC subtracts the value.
 
-At power-on the block starts with corrections of 0, but the setting data still have the values written last: write 0 to
-them before the axes are referenced.
+At power-up the setting data still have the values written last. Write those of the block before the axes are
+referenced, also the 0 of a correction whose `status[k]` is 5.
 
 The NC applies a changed value at a speed of at most dv = MD32000 x MD32760, distributed over several cycles; tan beta
 is limited to MD32760. Here a correction changes by at most {rate:g} um/s = {speed:g} mm/min. With MD32760 = 0.01 (the

@@ -1,7 +1,7 @@
 """All files of an export to structured text: the blocks, their test, and the instructions."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import get_args
 from uuid import NAMESPACE_URL, uuid5
 
@@ -34,6 +34,15 @@ Generate blocks from source; do the same for `{name}_test.scl`. For S7-1500 only
 {kilobytes} kB per instance).""",
 }
 
+#: how a variable is retained
+_RETAIN: dict[Dialect, str] = {
+    "codesys": "Declare `kept` where the block is called: `VAR RETAIN kept : {name}_state; END_VAR`, or in a list of "
+    "persistent variables, which also outlasts a download.",
+    "twincat": "Declare `kept` where the block is called: `VAR PERSISTENT kept : {name}_state; END_VAR` (with a UPS; "
+    "`VAR RETAIN` with NOVRAM).",
+    "scl": 'Declare `kept : "{name}_state"` in a global data block with optimized access and mark it *Retain*.',
+}
+
 _README = """{facts}
 
 # {name}: thermal compensation in structured text ({dialect})
@@ -60,7 +69,12 @@ Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds.
 | `age` | time since the values were measured [s] |
 | `elapsed` | time since the previous call, measured or the cycle time of the task [s] |
 | `reading` | optional: number of the reading, which changes with each new one, from 1; 0: they are not numbered |
+| `off_time` | at the first call: time without power [s], 0 if it is unknown |
+| `cold` | TRUE: the machine is cold; without effect once all references are known |
 | `restart` | rising edge: the present temperatures become the zero; the corrections continue without a jump |
+| `rezero`, `target`, `remaining` | rising edge: `correction[target]` continues from its value minus `remaining` [um] |
+| `first` | TRUE: the call counts as the first one after a power-up (for the test) |
+| `kept` | in and out: the retained state, a variable of type `{name}_state` |
 
 {stopped}
 
@@ -73,6 +87,15 @@ Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds.
 {corrections}
 
 {geometry}{zero} {status}{sensors}
+
+## At power-up
+
+{power}
+
+{retain} Every ten seconds the block copies its state to `kept`, with a check value and the number of its models;
+{kilobytes} kB must be retained. Give `off_time` from the controller's clock: keep the time of the last cycle in a
+retained variable, too, and do not call the block before the clock is valid. Apply `correction` before the axes are
+referenced.
 
 {about}## Test the sign
 
@@ -121,6 +144,8 @@ def write_blocks(
         dialect={"codesys": "CODESYS", "twincat": "TwinCAT 3", "scl": "Siemens SCL", "iec": "IEC 61131-3"}[dialect],
         install=_INSTALL[dialect].format(name=name, kilobytes=_kilobytes(tables)),
         about=f"{about.lstrip()}\n" if about else "",
+        retain=_RETAIN[dialect].format(name=name),
+        kilobytes=_kilobytes(tables, "s"),
         calls=len(readings.age),
         tolerance=allow(tables),
         **describe(compensator, tables),
@@ -144,9 +169,9 @@ def write_blocks(
     return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
 
 
-def _kilobytes(tables: Tables) -> int:
-    """Return the approximate size of an instance, with its constants [kB]."""
-    variables = [v for bag in BAGS for v in RECORDS[bag].variables().values()]
+def _kilobytes(tables: Tables, bags: Iterable[str] = BAGS) -> int:
+    """Return the approximate size of an instance, with its constants, or of some of its structures [kB]."""
+    variables = [v for bag in bags for v in RECORDS[bag].variables().values()]
     return 1 + 8 * sum(math.prod(tables.sizes.get(d, 0) for d in v.dims) for v in variables) // 1000
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from thermocomp.export.st.ststatements import (
     BAGS,
@@ -19,6 +20,7 @@ from thermocomp.export.st.ststatements import (
     write_functions,
     write_type,
 )
+from thermocomp.runtime.program.declarations import Var
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Kind
 
@@ -33,12 +35,49 @@ OUTPUTS: dict[str, str] = {
     "fault": "FAILING",
     "rejected": "",
     "outside": "",
+    "warm": "",
 }
+#: inputs of the function block that are not arrays, and their types
+INPUTS = {
+    "age": "LREAL",
+    "elapsed": "LREAL",
+    "reading": "LREAL",
+    "off_time": "LREAL",
+    "cold": "BOOL",
+    "restart": "BOOL",
+    "rezero": "BOOL",
+    "target": "DINT",
+    "remaining": "LREAL",
+    "first": "BOOL",
+}
+#: variables of the function block that it does not retain
+_OWN = {"running": "BOOL", "restarted": "BOOL", "rezeroed": "BOOL", "unsaved": "LREAL"}
 
-_BODY = """IF {restart} AND NOT {restarted} THEN
-    {start}({s});
+_BODY = """IF {first} OR NOT {running} THEN
+    {running} := TRUE;
+    {start}({s}, known := FALSE, keep := FALSE);
+    IF {kept}.model = {t}.fingerprint THEN
+        IF {check}(s := {kept}) = {kept}.checked THEN
+            {_}s := {kept};
+        END_IF;
+    END_IF;
+    {power_up}({bags}, off := {off_time});
+    IF {w}.begins > 0 THEN
+        {start}({s}, known := ({w}.begins = 1), keep := FALSE);
+    END_IF;
+END_IF;
+{unknown} := FALSE;
+FOR {k} := 0 TO {last_target} DO
+    {unknown} := {unknown} OR NOT {_}s.referenced[{k}];
+END_FOR;
+IF ({restart} AND NOT {restarted}) OR ({cold} AND {unknown}) THEN
+    {start}({s}, known := TRUE, keep := TRUE);
 END_IF;
 {restarted} := {restart};
+IF {rezero} AND NOT {rezeroed} THEN
+    {order}({bags}, k := {target}, remaining := {remaining});
+END_IF;
+{rezeroed} := {rezero};
 FOR {k} := 0 TO {last} DO
     {w}.value[{k}] := {value}[{k}];
     IF NOT {good}[{k}] THEN
@@ -49,7 +88,17 @@ END_FOR;
 {w}.{w_dt} := {elapsed};
 {w}.counter := {reading};
 {step}({bags});
+{unsaved} := {unsaved} + {elapsed};
+IF {first} OR ({unsaved} >= {interval}) OR ({unsaved} < 0.0) THEN
+    {unsaved} := 0.0;
+    {kept}.model := 0;
+    {kept} := {_}s;
+    {kept}.checked := {check}(s := {kept});
+    {kept}.model := {t}.fingerprint;
+END_IF;
 """
+#: longest time between two copies of the state to the retained one [s]
+INTERVAL = 10.0
 
 
 @dataclass(frozen=True)
@@ -86,41 +135,74 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
     functions = write_functions(tables, name, dialect)
     used = "\n".join(statements for _, statements in functions.values())
     used += " ".join([*(f" s.{safe(n)}" for n in OUTPUTS), f"w.value w.age w.{safe('dt')} w.counter t.rate"])
+    used += " s.referenced s.model s.checked t.fingerprint"
     if scl:
         used = used.replace("#", "")
     units = [SourceUnit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
     units += [SourceUnit(n, head, body, "END_FUNCTION") for n, (head, body) in functions.items()]
-    return [*units, _start(tables, name, used, scl), _block(tables, name, scl)]
+    return [*units, _start(tables, name, used, scl), _check(tables, name, used, scl), _block(tables, name, scl)]
 
 
 def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
-    """Return the function that restarts the compensator; the corrections in force are kept as the starting point."""
+    """Return the function that starts the compensator; the corrections in force may be kept as the starting point."""
     mark = "#" if scl else ""
     lines = []
     for n, var in used_in("s", used).items():
-        if n in ("correction", "slope"):
-            continue
-        zero = number(0, var.kind)
+        value = f"{mark}known" if n == "referenced" else number(0, var.kind)
+        own = [f"{mark}s.{safe(n)} := {value};"]
         if var.dims:
-            last = size_of(var, tables.sizes) - 1
-            lines += [f"FOR {mark}k := 0 TO {last} DO", f"    {mark}s.{safe(n)}[{mark}k] := {zero};", "END_FOR;"]
-        else:
-            lines.append(f"{mark}s.{safe(n)} := {zero};")
-    own = quoted(f"{name}_start", scl)
-    parts = [f"FUNCTION {own} : {'Void' if scl else 'BOOL'}", *(SCL if scl else [])]
-    parts += [
-        "(* Restart: the present temperatures become the zero; corrections continue from their present values. *)"
-    ]
-    parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})]
-    parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT"})]
-    return SourceUnit(f"{name}_start", "\n".join(parts), "\n".join(lines), "END_FUNCTION")
+            own = _each(var, tables, mark, [f"{mark}s.{safe(n)}[{mark}k] := {value};"])
+        kept = n in ("correction", "slope")
+        lines += [f"IF NOT {mark}keep THEN", *(f"    {line}" for line in own), "END_IF;"] if kept else own
+    about = "Start with a known reference or not; the next temperatures become the zero. Corrections may be kept."
+    given = {"known": "BOOL", "keep": "BOOL"}
+    return _function(name, "start", "Void" if scl else "BOOL", about, given, lines, scl)
+
+
+def _check(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
+    """Return the function that computes the check value of a state."""
+    mark = "#" if scl else ""
+    total, lines = f"{mark}total", [f"{mark}total := 0.0;"]
+    for n, var in used_in("s", used).items():
+        if n in ("model", "checked"):
+            continue
+        value = f"{mark}s.{safe(n)}[{mark}k]" if var.dims else f"{mark}s.{safe(n)}"
+        own = [f"{total} := {total} * 0.999 + {f'DINT_TO_LREAL({value})' if var.kind == 'int' else value};"]
+        if var.kind == "bool":
+            own = [f"{total} := {total} * 0.999;", f"IF {value} THEN", f"    {total} := {total} + 1.0;", "END_IF;"]
+        lines += _each(var, tables, mark, own) if var.dims else own
+    lines.append(f"{mark}{name}_sum := {total};")
+    return _function(name, "sum", "LREAL", "Return the check value of a state.", {}, lines, scl, {"total": "LREAL"})
+
+
+def _each(var: Var, tables: Tables, mark: str, lines: Sequence[str]) -> list[str]:
+    """Return statements for every element of an array, whose index is k."""
+    last = size_of(var, tables.sizes) - 1
+    return [f"FOR {mark}k := 0 TO {last} DO", *(f"    {line}" for line in lines), "END_FOR;"]
+
+
+def _function(
+    name: str,
+    word: str,
+    gives: str,
+    about: str,
+    given: Mapping[str, str],
+    lines: Sequence[str],
+    scl: bool,
+    own: Mapping[str, str] = MappingProxyType({}),
+) -> SourceUnit:
+    """Return a function of a state."""
+    parts = [f"FUNCTION {quoted(f'{name}_{word}', scl)} : {gives}", *(SCL if scl else []), f"(* {about} *)"]
+    parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)}), section("VAR_INPUT", given)]
+    parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT", **own})]
+    return SourceUnit(f"{name}_{word}", "\n".join(filter(None, parts)), "\n".join(lines), "END_FUNCTION")
 
 
 def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
     """Return the function block of the compensator."""
     mark, n = "#" if scl else "", len(tables.channels)
     outputs = {o: (tables.sizes[size] if size else 0) for o, size in OUTPUTS.items() if o != "fault" or tables.sensors}
-    kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real"}
+    kinds: Mapping[str, Kind] = {"correction": "real", "slope": "real", "warm": "bool"}
     numbered = [f"{k}: {c.name} [{c.unit}]" for k, c in enumerate(tables.channels)]
     parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(SCL if scl else [])]
     parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
@@ -131,25 +213,26 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
             {
                 "value": array("real", n),
                 "good": f"{array('bool', n)} := [{', '.join(['TRUE'] * n)}]",
-                "age": "LREAL",
-                "elapsed": "LREAL",
-                "reading": "LREAL",
-                "restart": "BOOL",
+                **INPUTS,
             },
         ),
         section(
             "VAR_OUTPUT",
-            {o: array(kinds.get(o, "int"), size) if size else TYPES["int"] for o, size in outputs.items()},
+            {o: array(kinds.get(o, "int"), n) if n else TYPES[kinds.get(o, "int")] for o, n in outputs.items()},
         ),
-        section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, "restarted": "BOOL"}),
-        section("VAR_TEMP" if scl else "VAR", {"k": "DINT"}),
+        section("VAR_IN_OUT", {"kept": quoted(f"{name}_state", scl)}),
+        section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, **_OWN}),
+        section("VAR_TEMP" if scl else "VAR", {"k": "DINT", "unknown": "BOOL"}),
     ]
-    names = ("s", "w", "k", "value", "good", "age", "elapsed", "reading", "restart", "restarted")
+    names = ("w", "t", "k", "unknown", "kept", "value", "good", *INPUTS, *_OWN)
+    calls = {"start": "start", "check": "sum", "power_up": "power_up", "order": "rezero", "step": "step"}
     body = _BODY.format(
-        **{v: f"{mark}{v}" for v in names if v != "s"},
+        **{v: f"{mark}{v}" for v in names},
+        **{v: quoted(f"{name}_{word}", scl) for v, word in calls.items()},
+        _=mark,
         s=f"s := {mark}s",
-        start=quoted(f"{name}_start", scl),
-        step=quoted(f"{name}_step", scl),
+        interval=number(INTERVAL),
+        last_target=len(tables.targets) - 1,
         w_dt=safe("dt"),
         last=n - 1,
         nothing=number(NOTHING),

@@ -17,10 +17,18 @@ _BODY = """IF NOT {_}done THEN
         {_}value[{_}j] := {_}v.given[{_}row * {width} + {_}j];
         {_}good[{_}j] := {_}value[{_}j] < 1.0E+30;
     END_FOR;
+    {_}event := TRUNC({_}v.given[{_}row * {width} + {inputs} + 3]);
+    IF {_}event = 2 THEN
+        {_}kept.correction[0] := {_}kept.correction[0] + 1.0;
+    END_IF;
     {_}tested(value := {_}value, good := {_}good, age := {_}v.given[{_}row * {width} + {inputs}],
         elapsed := {_}v.given[{_}row * {width} + {inputs} + 1],
-        reading := {_}v.given[{_}row * {width} + {inputs} + 2], restart := FALSE);
-    {_}off := (({_}tested.rejected = 0) <> {_}v.used[{_}row]);
+        reading := {_}v.given[{_}row * {width} + {inputs} + 2],
+        off_time := {_}v.given[{_}row * {width} + {inputs} + 4],
+        cold := FALSE, restart := ({_}event = 3), rezero := ({_}event > 3), target := {_}event - 4,
+        remaining := {_}v.given[{_}row * {width} + {inputs} + 4],
+        first := ({_}event = 1) OR ({_}event = 2), kept := {_}kept);
+    {_}off := (({_}tested.rejected = 0) <> {_}v.used[{_}row]) OR ({_}tested.warm <> {_}v.warm[{_}row]);
     FOR {_}j := 0 TO {last_target} DO
         {_}want := {_}v.wanted[{_}row * {targets} + {_}j];
         {_}size := ABS({_}want);
@@ -61,6 +69,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         "wanted": ("real", answers.correction.ravel().tolist()),
         "told": ("int", answers.status.ravel().tolist()),
         "used": ("bool", answers.passed.tolist()),
+        "warm": ("bool", answers.warm.tolist()),
     }
     if sensors:
         held["found"] = ("int", answers.fault.ravel().tolist())
@@ -80,6 +89,8 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
             "VAR",
             {
                 "tested": quoted(name, scl),
+                "kept": quoted(f"{name}_state", scl),
+                "event": "DINT",
                 "v": quoted(f"{name}_vectors", scl),
                 "value": array("real", inputs),
                 "good": array("bool", inputs),
@@ -94,7 +105,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
     sizes = {
         "_": mark,
         "inputs": inputs,
-        "width": inputs + 3,
+        "width": inputs + 5,
         "last": inputs - 1,
         "targets": targets,
         "last_target": targets - 1,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from thermocomp.runtime.program import steps
+from thermocomp.runtime.program import powering, steps
 from thermocomp.runtime.program.language import find_function, is_known
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Call, For, Function, If, Kind, Name, ProcedureCall, Statement, While, walk
@@ -12,6 +12,8 @@ from thermocomp.runtime.program.tree import Call, For, Function, If, Kind, Name,
 
 def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> list[Function]:
     """Return the functions that a compensator needs, callees before callers; `step` is the last.
+
+    Called from outside are ``power_up``, ``rezero`` and ``step``.
 
     Parameters
     ----------
@@ -32,7 +34,8 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
                 add(node.name)
         found[name] = replace(function, name=name, body=body)
 
-    add(steps.step.__name__)
+    for called in (powering.power_up, powering.rezero, steps.step):
+        add(called.__name__)
     return list(found.values())
 
 

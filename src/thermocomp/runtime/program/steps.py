@@ -7,10 +7,12 @@ numbers only.
 """
 
 from thermocomp.core.bounds import GAP
-from thermocomp.runtime.program import feeding, watching
+from thermocomp.runtime.powerup import AT_ONCE
+from thermocomp.runtime.program import feeding, powering, watching
 from thermocomp.runtime.program.averaging import Averaged
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
 from thermocomp.runtime.program.language import (
+    choose,
     each,
     exp,
     function,
@@ -20,11 +22,11 @@ from thermocomp.runtime.program.language import (
     procedure,
     when,
 )
-from thermocomp.runtime.program.numbers import find_day, larger, smaller
+from thermocomp.runtime.program.numbers import larger, smaller
 from thermocomp.runtime.program.values import Number, Whole
 from thermocomp.runtime.program.variables import Constants, Kept, Work
 
-STARTS, ACTIVE, HOLDING, FADING, SHADOW = range(5)
+STARTS, ACTIVE, HOLDING, FADING, SHADOW, UNKNOWN = range(6)
 UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3
 
 
@@ -53,10 +55,13 @@ def step(s: Kept, w: Work, t: Constants) -> None:
         for k in each("k", t.TARGETS):
             s.status[k] = HOLDING
     for k in each("k", t.TARGETS):
+        with when(~s.referenced[k] & ~t.shadow[k]):
+            s.status[k] = UNKNOWN
         with when(s.status[k].equals(HOLDING)):
             idle(s, w, t, k)
         with otherwise():
             s.idle[k] = 0.0
+        powering.obey(s, w, t, k)
 
 
 @procedure
@@ -118,16 +123,10 @@ def check(s: Kept, w: Work, t: Constants) -> None:
 @procedure
 def check_start(s: Kept, w: Work, t: Constants, g: Whole) -> None:
     """Check that the temperatures of a model are plausible for a starting machine."""
-    w.rows = 0
-    for m in each("m", t.set_begin[g], t.set_begin[g + 1]):
-        r = let("r", t.set_range[m])
-        with when(t.temperature[r] & t.rezero[r]):
-            w.column[w.rows] = w.value[t.channel[r]] - t.reference[r]
-            w.rows = w.rows + 1
+    powering.collect_offsets(s, w, t, g, lambda c: w.value[c])
     with when(w.rows > 0):
-        find_day(s, w, t)
         for m in each("m", t.set_begin[g], t.set_begin[g + 1]):
-            r.set(t.set_range[m])
+            r = let("r", t.set_range[m])
             with when(t.temperature[r] & t.rezero[r]):
                 off = let("off", w.value[t.channel[r]] - t.reference[r])
                 with when((abs(w.middle) > t.zero_change) | (abs(off - w.middle) > t.span[r])):
@@ -150,6 +149,7 @@ def take(s: Kept, w: Work, t: Constants) -> None:
     with when(t.has_zero):
         with when(~s.known):
             gather(s, w, t)
+            powering.suspect(s, w, t)
         with when(s.known):
             models_rezeroed(s, w, t)
     s.outside = 0
@@ -168,7 +168,7 @@ def take(s: Kept, w: Work, t: Constants) -> None:
                 s.status[k] = STARTS
         with when(t.watched), when(s.status[k].equals(ACTIVE)):
             watching.judge(s, w, t, k)
-        with when(s.status[k].equals(ACTIVE)):
+        with when(s.status[k].equals(ACTIVE) & (s.referenced[k] | t.shadow[k])):
             drive(s, w, t, k)
 
 
@@ -204,26 +204,26 @@ def gather(s: Kept, w: Work, t: Constants) -> None:
 @procedure
 def drive(s: Kept, w: Work, t: Constants, k: Whole) -> None:
     """Move a correction towards the value required by its models, within the limits at both ends of the travel."""
-    w.offset = 0.0
-    w.tilt = 0.0
-    for m in each("m", t.line_begin[k], t.line_begin[k + 1]):
-        w.offset = w.offset - t.to_offset[m] * s.deviation[m]
-        w.tilt = w.tilt - t.to_slope[m] * s.deviation[m]
+    powering.demand(s, w, t, k)
+    w.offset = w.offset - s.shift[k]
+    w.tilt = w.tilt - s.tilt[k]
     band = let("band", t.dead_band)
     with when(t.shadow[k]):
         s.status[k] = SHADOW
         w.offset = 0.0
         w.tilt = 0.0
         band.set(0.0)
+    travel = let("travel", choose(s.resumed[k], AT_ONCE, w.travel))
+    s.resumed[k] = False
     low = let("low", t.travel_low[k] - t.position[k])
     high = let("high", t.travel_high[k] - t.position[k])
     with when((low >= high) | (w.tilt.equals(0.0) & s.slope[k].equals(0.0))):
-        s.correction[k] = limit(w.offset, s.correction[k], w.travel, t.magnitude, t.rate, band)
+        s.correction[k] = limit(w.offset, s.correction[k], travel, t.magnitude, t.rate, band)
     with otherwise():
         w.end[0] = s.correction[k] + s.slope[k] * 0.001 * low
         w.end[1] = s.correction[k] + s.slope[k] * 0.001 * high
-        w.end[0] = limit(w.offset + w.tilt * 0.001 * low, w.end[0], w.travel, t.magnitude, t.rate, band)
-        w.end[1] = limit(w.offset + w.tilt * 0.001 * high, w.end[1], w.travel, t.magnitude, t.rate, band)
+        w.end[0] = limit(w.offset + w.tilt * 0.001 * low, w.end[0], travel, t.magnitude, t.rate, band)
+        w.end[1] = limit(w.offset + w.tilt * 0.001 * high, w.end[1], travel, t.magnitude, t.rate, band)
         rise = let("rise", (w.end[1] - w.end[0]) / (high - low))
         s.correction[k] = w.end[0] - rise * low
         s.slope[k] = 1000.0 * rise

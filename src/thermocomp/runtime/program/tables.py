@@ -1,5 +1,7 @@
 """Numbers of a compensator as constants of its program: see `thermocomp.runtime.program.variables`."""
 
+import re
+from hashlib import sha256
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,16 +16,21 @@ from thermocomp.core.starting import find_start_span
 from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.powerup import find_cold_after
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
+from thermocomp.runtime.program.variables import Kept
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
-#: thresholds of the gate and of the feed
+#: limits
+OF_LIMITS = ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")
+#: thresholds of gate, feed and power-up
 OF_GATE = (
     "stopped_speed",
     "clock_skew",
     "zero_change",
+    "resumable",
     "repeat_factor",
     "repeat_margin",
     "repeat_wait",
@@ -108,7 +115,7 @@ def gather(compensator: Compensator) -> Tables:
     sensors = watch.failing if watch else ()
     limits, lines, thresholds = compensator.limits, compensator.lines, compensator.thresholds
     values: dict[str, Any] = {
-        **{name: getattr(limits, name) for name in ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")},
+        **{name: getattr(limits, name) for name in OF_LIMITS},
         **{name: getattr(zeroing, name) for name in ("at_rest", "otherwise")},
         "speed_channel": place.get(zeroing.speed, 0),
         "unsigned": [c.name in compensator.unsigned for c in channels],
@@ -147,9 +154,16 @@ def gather(compensator: Compensator) -> Tables:
         targets=tuple(lines),
         models=models,
         sizes=sizes,
-        values=values,
+        values=values | {"fingerprint": _fingerprint(values, formulas.functions)},
         formulas=formulas.functions,
     )
+
+
+def _fingerprint(values: dict[str, Any], formulas: dict[str, Function]) -> int:
+    """Return a hash, from 1 to 2**31 - 1, of the models and of what is kept of them; limits may change."""
+    numbers = {name: value for name, value in values.items() if name not in OF_LIMITS}
+    text = re.sub(r"np\.\w+\(([^()]*)\)", r"\1", repr((numbers, formulas, list(Kept.variables()))))
+    return 1 + int(sha256(text.encode()).hexdigest()[:8], 16) % (2**31 - 1)
 
 
 def _channels(known: list[Input], speed: str) -> tuple[Input, ...]:
@@ -228,6 +242,7 @@ def _lines(compensator: Compensator) -> dict[str, Any]:
         "travel_low": [low for low, _ in travels],
         "travel_high": [high for _, high in travels],
         "shadow": [t in compensator.shadow for t in compensator.lines],
+        "cold_after": find_cold_after(compensator),
     }
 
 
