@@ -22,7 +22,7 @@ def test_it_prints_the_tests_and_writes_the_best(drift: str, capsys: pytest.Capt
     given = ("plan", drift, "--target", "z_um", "--top-speed", "6000", "--jobs", "1", "-o", "next.ngc")
     assert run([*given]) == 0
     told = capsys.readouterr().out
-    assert "Next: 6,000 1/min" in told
+    assert "Record next: 6,000 1/min" in told
     assert "no run faster than 3,000 1/min" in " ".join(told.split())
     assert "So far:" in told
     assert "Written: next.ngc, next.csv, next.png" in told
@@ -60,7 +60,7 @@ def test_speeds_in_a_random_order_are_a_proof(drift: str, capsys: pytest.Capture
     ]
     assert run([*given, "--probe-every", "0"]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "Next: 5 runs of 0.5 h at 600 to 3,000 1/min in a random order (seed 7), each with a stop" in told
+    assert "Record next: 5 runs of 0.5 h at 600 to 3,000 1/min in a random order (seed 7), each with a stop" in told
     program = Path("proof.ngc").read_text(encoding="ascii")
     assert "in a random order seed 7 each" in program
     speeds = [int(line[1:].split()[0]) for line in program.splitlines() if line.startswith("S")]
@@ -107,7 +107,7 @@ def test_in_python_it_is_a_table_a_figure_and_a_sentence(tmp_path: Path) -> None
     assert found.next.trial.speed == 6000.0
     assert found.curve is not None
     assert len(found.plot().axes) == 5
-    assert str(found).startswith("Next: 6,000 1/min for ")
+    assert str(found).startswith("Record next: 6,000 1/min for ")
     assert found.write(tmp_path / "a.ngc", dialect="fanuc", every=0) == tmp_path / "a.csv"
     alone = tc.plan(small_machine((2000.0,)), "z_um")
     assert alone.curve is None

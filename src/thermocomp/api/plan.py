@@ -138,7 +138,7 @@ class Planned(Result):
         why = f" ({best.news})" if best.news else ""
         low, high = best.gain_range
         found = [
-            f"Next: {best.trial.words}; expected gain {best.gain:.2f} um ({low:.2f} to {high:.2f}) of "
+            f"Record next: {best.trial.words}; expected gain {best.gain:.2f} um ({low:.2f} to {high:.2f}) of "
             f"{self.plan.expected:.2f} um{why}."
         ]
         if self.curve is not None:
