@@ -96,6 +96,7 @@ def test_rules_for_what_the_paper_leaves_open() -> None:
     assert grouping.group(matrix({}, 2, 0.95), 0.9) == ((0, 1),)
     # "greater than", not "at least"
     assert grouping.group(matrix({(0, 1): 0.1}, 3, 0.9), 0.9) == ((0,), (1,), (2,))
+    assert grouping.group(matrix({(0, 1): 0.1, (0, 2): 0.5}, 3, 0.9), 0.9) == ((0,), (1,), (2,))
     # ties for the smallest: the first pair
     assert grouping.group(matrix({}, 4, 0.0), 0.9) == ((0,), (1,), (2,), (3,))
     # E-H2: sensors that move against each other are the farthest, or the closest
@@ -202,6 +203,8 @@ def test_rounding_is_told_from_a_small_remainder(seed: int) -> None:
     y, groups = 1e6 * X[:, 0], ((0, 1), (2, 3), (4,))
     assert grouping.representatives(tri(X, y), groups) == (0, 2, 4)
     assert grouping.representatives(tri(X, y + 1e-5 * X[:, 3]), groups) == (0, 3, 4)
+    almost = X[:, 0] + 3e-6 * X[:, 2]  # explains more, by a share of 1e-11
+    assert grouping.representatives(tri(np.column_stack([X[:, 0], almost]), almost), ((0, 1),)) == (0,)
     found = exhaustive.search_subsets(tri(X[:, :4], y), range(4))
     assert (found.best.columns, found.best.mse) == ((0,), 0.0)
     # a column of zeros explains nothing, with or without a constant

@@ -116,6 +116,11 @@ def test_constant_beyond_the_trained_projection() -> None:
     assert estimator.predict([[-5.0], [0.0], [10.0], [25.0]]) == pytest.approx([0.0, 0.0, 20.0, 20.0], abs=1e-2)
 
 
+def test_nothing_to_explain() -> None:
+    X = np.linspace(0, 10, 200)[:, None]
+    assert np.isnan(ProjectionPursuit(max_terms=1).fit(X, np.zeros(200)).r_squared_)
+
+
 # -- smoother: against the same smoother in plain matrices -------------------------------------------------------------
 
 

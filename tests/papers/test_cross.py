@@ -197,6 +197,7 @@ def test_one_table_of_all(recording: Recording, monkeypatch: pytest.MonkeyPatch)
     assert panel.curves[0].label == "ols"
     assert panel.curves[0].y[0] == pytest.approx(ratio)
     assert panel.curves[0].x.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert "1 moving, z_um; 2 resting, x_um;" in study.figures[0].caption
 
 
 def test_a_method_that_does_harm_is_a_finding() -> None:

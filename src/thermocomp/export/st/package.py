@@ -40,6 +40,7 @@ _RETAIN: dict[Dialect, str] = {
     "persistent variables, which also outlasts a download.",
     "twincat": "Declare `kept` where the block is called: `VAR PERSISTENT kept : {name}_state; END_VAR` (with a UPS; "
     "`VAR RETAIN` with NOVRAM).",
+    "iec": "Declare `kept` where the block is called: `VAR RETAIN kept : {name}_state; END_VAR`.",
     "scl": 'Declare `kept : "{name}_state"` in a global data block with optimized access and mark it *Retain*.',
 }
 
