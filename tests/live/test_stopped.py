@@ -33,7 +33,7 @@ async def main():
         begin = time.monotonic()
         while True:
             now = time.monotonic() - begin
-            t = 22.0 if now > 12.0 else 20.0 + 0.001 * (int(20.0 * now) % 2)  # a source that works
+            t = 20.0 + 2.0 * (now > 12.0) + 0.001 * (int(20.0 * now) % 2)  # a source that works
             await client.publish("m", json.dumps({{"t": t}}))
             await asyncio.sleep(0.05)
 asyncio.run(main())
