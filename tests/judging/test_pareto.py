@@ -114,11 +114,17 @@ def test_one_block_alone_does_not_mean_all_sensors() -> None:
     assert small.margin() == (0.2, 0.0, 0.2)
     assert small.enough("ols") == 4  # nothing less is near: then it is all of them, and said so
     assert pareto.trade_off(small, "ols", 3) == "with fewer sensors the error exceeds the margin of the rule"
-    assert pareto.trade_off(one, "ols", 1) == "2 sensors cost 0.45 um more than 4, the best of the table"
-    assert pareto.trade_off(one, "ols", 0) == "1 sensor costs 0.8 um more than 4, the best of the table"
+    assert (
+        pareto.trade_off(one, "ols", 1)
+        == "2 sensors cost 0.45 um more than 4, the best of the table (means over the blocks)"
+    )
+    assert (
+        pareto.trade_off(one, "ols", 0)
+        == "1 sensor costs 0.8 um more than 4, the best of the table (means over the blocks)"
+    )
     other = by_hand([[2.3], [1.95], [1.4], [1.5]], [20.0])
     assert pareto.trade_off(other, "ols", 1) == (
-        "2 sensors cost 0.55 um more than 3, the best of the table and 0.45 um more than 4"
+        "2 sensors cost 0.55 um more than 3, the best of the table and 0.45 um more than 4 (means over the blocks)"
     )
 
 
@@ -225,7 +231,8 @@ def test_another_model_with_as_many_sensors_is_named() -> None:
     one = by_hand([[4.0], [2.0], [2.0], [2.0]], [20.0])
     two = replace(one, models=("ols", "averaged"), rms=np.concatenate([one.rms, one.rms + 0.13]))
     assert pareto.trade_off(two, "averaged", 1) == (
-        "2 sensors cost 0.13 um more than as many by ols, the best of the table and 0 um more than 4"
+        "2 sensors cost 0.13 um more than as many by ols, the best of the table and 0 um more than 4 "
+        "(means over the blocks)"
     )
     alone = replace(one, sensors=one.sensors[:1], rms=one.rms[:, :1])
     assert pareto.trade_off(alone, "ols", 0) == "there is no other set to choose from"

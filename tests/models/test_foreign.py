@@ -168,7 +168,7 @@ def test_a_regressor_needs_no_base_class(samples: Samples) -> None:
         (Plane, r"Plane is a class: pass an instance, Plane\(\)"),
         (3.0, "float is not a regressor: name a method, or pass an instance"),
         (StandardScaler(), "StandardScaler is not a regressor"),
-        (Sorter(), "Sorter is not a regressor"),
+        pytest.param(Sorter(), "Sorter is not a regressor", id="Sorter"),
         (DynamicRidge(time="none"), r"DynamicRidge\(time='none'\) treats every row as a steady state"),
         (make_pipeline(PartialF(), DynamicRidge(time="none")), "has a memory, and .* cannot pass it the time here"),
         (GridSearchCV(DynamicRidge(time="none"), {"rule": ["minimum"]}), "DynamicRidge .estimator. has a memory"),

@@ -48,7 +48,7 @@ def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
 
 def _leans(e: Explanation) -> str:
     known = sorted((s for s in e.sensors if s.bound is not None), key=lambda s: -(s.bound or 0.0))
-    return ", ".join(f"{s.name} {s.bound:.1f}" for s in known[:2]) or few([s.name for s in e.sensors])
+    return ", ".join(f"{s.name} {s.bound:.1f}" for s in known[:2]) or f"{len(e.sensors)} inputs together"
 
 
 def _worst_lost(e: Explanation) -> str:

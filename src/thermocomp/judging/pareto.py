@@ -293,7 +293,7 @@ def trade_off(found: Budget, model: str, place: int) -> str:
             if n > 1
             else "there is no other set to choose from"
         )
-    return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)}"
+    return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)} (means over the blocks)"
 
 
 def _rule(found: Budget) -> str:

@@ -43,17 +43,17 @@ def few(names: Sequence[str]) -> str:
 
 
 def spares(wanted: Mapping[str, str]) -> list[PrintedLine]:
-    """Return a line about the sensors that want a spare, each with the reason."""
+    """Return a line about the sensors for which a spare is recommended, with the first reason."""
     named = "" if len(wanted) == 1 else "{}: "
     first = next((f" ({named.format(name)}{why})" for name, why in wanted.items()), "none")
-    return [PrintedLine(f"Sensors that want a spare: {few(list(wanted))}{first}.")]
+    return [PrintedLine(f"Spare sensor recommended for: {few(list(wanted))}{first}.")]
 
 
 def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
-    """Return a line about the sensors of models that want a spare."""
+    """Return a line about the sensors of models for which a spare is recommended."""
     if not any(s.watched for e in models for s in e.sensors):
         return [PrintedLine("Sensors are not monitored: a wrong value is not detected.")]
-    return spares({s.name: s.spare for e in models for s in e.sensors if s.spare})
+    return spares({s.name: f"{e.target}, {s.spare}" for e in models for s in e.sensors if s.spare})
 
 
 def in_unit(target: str, unit: str) -> str:

@@ -50,7 +50,7 @@ def fit(fitted: Fitted, files: Sequence[object], following: Sequence[str]) -> Co
     may = sum(m.accepted for m in models)
     return CommandAnswer(
         head=f"{_list(dict.fromkeys(a.model for a in rows))}, fitted to all data: {may} of {len(models)} models may "
-        f"run. Their errors are those on unseen data: {told.judging.name}.",
+        f"run. The errors are those of models fitted without the judged data: {told.judging.name}.",
         table=_results(rows, "model"),
         lines=[*_worst_cycle(rows), *spares_of(explain_all(models).models)],
         warnings=[
@@ -116,16 +116,14 @@ def choices(found: Sequence[Choice], files: Sequence[object], following: Sequenc
     heads = dict[tuple[str, ...], list[str]]()
     for c in chosen:
         heads.setdefault(c.sensors, []).append(c.target)
+    # the first note on a budget is its rule
+    notes = list(dict.fromkeys(note for c in found for note in c.notes[isinstance(c.details, Budget) :]))
     said = [f"Use {', '.join(sensors)} ({len(sensors)}) for {', '.join(of)}" for sensors, of in heads.items()]
     return CommandAnswer(
         head="; ".join(said or [f"No set of sensors for {', '.join(c.target for c in found)}"]) + ".",
         table=_selected(found),
-        lines=[PrintedLine(f"Why: {c.reason}") for c in chosen[:1]],
-        warnings=[
-            *(f"{c.target}: {c.reason}" for c in found if c.failure),
-            # the first note on a budget is its rule
-            *dict.fromkeys(note for c in found for note in c.notes[isinstance(c.details, Budget) :]),
-        ],
+        lines=[*(PrintedLine(f"Why: {c.reason}") for c in chosen[:1]), *map(PrintedLine, notes[:1])],
+        warnings=[f"{c.target}: {c.reason}" for c in found if c.failure],
         files=files,
         following=following if chosen else (),
     )
@@ -160,7 +158,7 @@ def _worst_cycle(rows: Sequence[Assessment]) -> list[PrintedLine]:
     harm = ", harmful" if u.harmful else ""
     return [
         PrintedLine(
-            f"Worst cycle: {a.target} in {u.name}, {u.rms:.2f} {a.verdict.unit} RMS instead of {u.none_rms:.2f}{harm}."
+            f"Worst cycle: {u.name} for {a.target}, {u.rms:.2f} {a.verdict.unit} RMS instead of {u.none_rms:.2f}{harm}."
         )
     ]
 

@@ -96,7 +96,7 @@ class LearningCurve:
         """Return the interpretation of the learning curve as text."""
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
-        of = f"{first.rms:.2f} um after {first.learned} cycle(s), {last.rms:.2f} after {last.learned}"
+        of = f"{first.rms:.2f} um after {first.learned} of the cycles, {last.rms:.2f} after {last.learned}"
         n = last.learned - levels[-2].learned if len(levels) > 1 else 1
         way = "reduced" if self.last_gain >= 0 else "increased"
         which = "the last cycle" if n == 1 else f"each of the last {n} cycles"
