@@ -24,7 +24,7 @@ def test_it_prints_the_tests_and_writes_the_best(drift: str, capsys: pytest.Capt
     told = capsys.readouterr().out
     assert "Record next: 6,000 1/min" in told
     assert "no run faster than 3,000 1/min" in " ".join(told.split())
-    assert "So far:" in told
+    assert "Unseen cycles so far:" in told
     assert "Written: next.ngc, next.csv, next.png" in told
     assert "S6000 M3" in Path("next.ngc").read_text(encoding="ascii")
     assert Path("next.png").read_bytes().startswith(b"\x89PNG")

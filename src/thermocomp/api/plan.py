@@ -133,17 +133,22 @@ class Planned(Result):
             overwrite=overwrite,
         )
 
+    @property
+    def so_far(self) -> str:
+        """Return the learning curve as a sentence; empty without it."""
+        return "" if self.curve is None else f"Unseen cycles so far: {self.curve.words}."
+
     def __str__(self) -> str:
         best = self.next
         why = f" ({best.news})" if best.news else ""
         low, high = best.gain_range
         found = [
             f"Record next: {best.trial.words}; expected gain {best.gain:.2f} um ({low:.2f} to {high:.2f}) of "
-            f"{self.plan.expected:.2f} um{why}."
+            f"{self.plan.expected:.2f} um, calculated over all tests of the grid{why}."
         ]
-        if self.curve is not None:
-            found.append(f"So far: {self.curve.words}.")
-        return " ".join([*found, *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])])
+        return " ".join(
+            [*found, *filter(None, [self.so_far]), *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])]
+        )
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, print_table
 from thermocomp.core.exceptions import InputError
 from thermocomp.report.answer import CommandAnswer
-from thermocomp.report.layout import Column, Layout
+from thermocomp.report.layout import Column, Layout, PrintedLine
 
 #: number of tests shown without ``--details``
 SHOWN = 5
@@ -95,7 +95,11 @@ def _answer(found: Planned, files: list[Path], face: CommandFace) -> CommandAnsw
     followed = () if files else face.following("plan", output=free("next.ngc"))
     shown = found.plan.candidates[:SHOWN]
     return CommandAnswer(
-        head=str(replace(found, trouble=())), table=Layout(columns, shown), files=files, following=followed
+        head=str(replace(found, trouble=(), curve=None)),
+        table=Layout(columns, shown),
+        lines=[PrintedLine(found.so_far)] if found.curve is not None else [],
+        files=files,
+        following=followed,
     )
 
 

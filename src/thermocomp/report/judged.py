@@ -27,7 +27,7 @@ def comparison(told: Comparison, files: Sequence[object], following: Sequence[st
     stopped = [f"stopped: {told.left} combinations of method and target were not judged"] if told.left else []
     return CommandAnswer(
         head=summary.verdict(told),
-        table=_results(rows, "use"),
+        table=_results(rows, choosing=True),
         lines=[
             *declared.answer(rows),
             *_worst_cycle(rows),
@@ -51,7 +51,7 @@ def fit(fitted: Fitted, files: Sequence[object], following: Sequence[str]) -> Co
     return CommandAnswer(
         head=f"{_list(dict.fromkeys(a.model for a in rows))}, fitted to all data: {may} of {len(models)} models may "
         f"run. The errors are those of models fitted without the judged data: {told.judging.name}.",
-        table=_results(rows, "model"),
+        table=_results(rows),
         lines=[*_worst_cycle(rows), *spares_of(explain_all(models).models)],
         warnings=[
             *(
@@ -80,7 +80,7 @@ def assess(
     return CommandAnswer(
         head=f"On these recordings: {'; '.join(f'{word} for {_list(t)}' for word, t in words.items())}. "
         "RMS here, and on unseen data when fitted.",
-        table=_results(rows, "model", {target: h.rms for target, h in fitted.items()}),
+        table=_results(rows, {target: h.rms for target, h in fitted.items()}),
         lines=[*declared.answer(rows), *_worst_cycle(rows), *_dear(rows)],
         warnings=[
             *(
@@ -134,11 +134,13 @@ def _nearest(found: Comparison, target: str) -> Assessment:
     return min((a for a in found.overall() if a.target == target), key=lambda a: (bool(a.failure), a.metric("rms")))
 
 
-def _results(rows: Sequence[Assessment], model: str, fitted: Mapping[str, float] | None = None) -> Layout:
+def _results(
+    rows: Sequence[Assessment], fitted: Mapping[str, float] | None = None, *, choosing: bool = False
+) -> Layout:
     """Return the table of one model for each target; with `fitted` also the error when it was fitted."""
     columns = (
         Column("target", lambda a: in_unit(a.target, a.verdict.unit)),
-        Column(model, lambda a: a.model if a.accepted or model != "use" else f"none yet ({a.model})"),
+        Column("method", lambda a: f"none yet ({a.model})" if choosing and not a.accepted else a.model),
         Column("inputs", lambda a: "-".join(map(str, dict.fromkeys(a.n_sensors))), ">"),
         Column("RMS", lambda a: a.metric("rms"), ".2f"),
         *([] if fitted is None else [Column("when fitted", lambda a: fitted.get(a.target), ".2f")]),
@@ -194,4 +196,4 @@ def _selected(choices: Sequence[Choice]) -> Layout:
     rows = [(target, *map(float, mine), best[0]) for target, *mine in zip(budget.targets, *found, strict=True)]
     headings = (f"RMS with {budget.sizes[best[1]]}", f"with all {budget.sizes[-1]}", "instead of")
     numbers = (Column(heading, k, ".2f") for k, heading in enumerate(headings, start=1))
-    return Layout((Column("target", 0), *numbers, Column("model", 4)), rows)
+    return Layout((Column("target", 0), *numbers, Column("method", 4)), rows)
