@@ -135,7 +135,7 @@ END_FOR;"""
 
 
 def test_the_project_holds_the_same(plain: list[SourceUnit]) -> None:
-    root = ET.fromstring(write_project(plain, "tc_x", FACTS))
+    root = ET.fromstring(write_project(plain, "tc_x", FACTS, "about"))
     pous = {p.attrib["name"]: p for p in root.iterfind(".//p:pou", XML)}
     kinds = [k.attrib["name"] for k in root.iterfind(".//p:dataType", XML)]
     assert [*kinds, *pous] == [u.name for u in sorted(plain, key=lambda u: bool(u.end))]

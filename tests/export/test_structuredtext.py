@@ -257,7 +257,10 @@ def test_the_files_of_twincat_are_read_by_blark(tmp_path: Path, watched: Compens
 
 def test_the_first_line_is_the_verdict(watched: Compensator) -> None:
     for dialect in ("codesys", "scl"):
-        for name, text in write_package(watched, "x", FACTS, dialect).items():
+        files = write_package(watched, "x", FACTS, dialect)
+        if project := files.pop("tc_x.xml", None):
+            assert b'contentDescription="z_um: accepted on unseen cycles;' in project
+        for name, text in files.items():
             assert text.decode().split("\n")[0].strip("(* )") == "z_um: accepted on unseen cycles", name
 
 

@@ -31,7 +31,7 @@ GIVEN = {
     "nc/linuxcnc/verification/verify.py": {"of": 1},
     "nc/revision/job.py": {"_expand": 1, "_write": 3},
     "live/journal/journal.py": {"_set_aside": 1},  # a journal that is damaged is moved aside, not lost
-    "nc/revision/ncprogram.py": {"open_to_write": 1, "replace_lines": 1},
+    "nc/revision/ncprogram.py": {"copy_without_mark": 1, "open_to_write": 1, "replace_lines": 1},
     "papers/exported.py": {"write_loop": 1},  # sources to be compiled, in a temporary folder
     "live/keeper.py": {"put_aside": 1},  # a state that is refused is moved aside, not lost
 }

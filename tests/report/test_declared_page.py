@@ -12,6 +12,7 @@ from smallmachine import small_machine
 
 import thermocomp as tc
 from thermocomp.cli.app import run
+from thermocomp.cli.terminal import console
 from thermocomp.recordings.declared import Declared, HeaderData, MeasuringUncertainty, Workpiece
 from thermocomp.recordings.readers import recordings
 
@@ -35,7 +36,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def out(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., str]:
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setattr(console, "_width", 200)
 
     def ran(*arguments: str) -> str:
         assert run(arguments) in (0, 1)

@@ -158,7 +158,7 @@ def write_blocks(
         files = {}
         if dialect != "scl":
             plain = adapt([*units, *tests], name)
-            files[f"{name}.xml"] = write_project(plain, name, facts)
+            files[f"{name}.xml"] = write_project(plain, name, facts, "; ".join(said))
             if dialect == "iec":
                 names = {t.name for t in tests}
                 tests = [u for u in plain if u.name.startswith(tuple(names))]

@@ -13,7 +13,7 @@ _ELEMENTARY = ("LREAL", "DINT", "BOOL")
 _SECTIONS = {"VAR_INPUT": "inputVars", "VAR_IN_OUT": "inOutVars", "VAR_OUTPUT": "outputVars", "VAR": "localVars"}
 
 
-def write_project(units: Sequence[SourceUnit], name: str, facts: Facts) -> str:
+def write_project(units: Sequence[SourceUnit], name: str, facts: Facts, about: str) -> str:
     """Return a project of units in structured text of the second edition, see `secondedition.adapt`."""
     root = ET.Element("project", xmlns=NAMESPACE)
     ET.SubElement(
@@ -23,7 +23,7 @@ def write_project(units: Sequence[SourceUnit], name: str, facts: Facts) -> str:
         productName="thermocomp",
         productVersion=facts.version,
         creationDateTime=f"{facts.date}T00:00:00",
-        contentDescription="; ".join(facts.origin()),
+        contentDescription=about,
     )
     scales = ET.SubElement(ET.SubElement(root, "contentHeader", name=name), "coordinateInfo")
     for language in ("fbd", "ld", "sfc"):

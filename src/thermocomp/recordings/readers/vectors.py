@@ -32,11 +32,12 @@ class Vector:
     ----------
     group : str
         Table to which it belongs; vectors of other groups are other tables.
-    name, unit : str
+    name : str
     size : int
         Number of values.
     load : callable
         Function that returns the values, of shape (size,).
+    unit : str
     kind : str
         Kind of the values, as in ``numpy.dtype.kind``.
     step : float
