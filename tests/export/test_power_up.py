@@ -262,3 +262,24 @@ def test_the_state_outlasts_linuxcnc_in_a_file(tmp_path: Path) -> None:
         lost = HalStand(tmp_path, str(kept), ago=100)
         run(lost, 26.0)
         assert (lost["status-0"], lost["correction-0"]) == (UNKNOWN, 0.0)
+
+
+@needs_compiler
+@pytest.mark.parametrize("missing", [0, 1, 30])
+def test_what_is_taken_at_once_is_so_right_after_power_up_or_not_at_all(missing: int, tmp_path: Path) -> None:
+    """Once readings have been missing for longer than they may be old, the axes may be in use: no step then."""
+    slow = Compensator.of([watched_model("z_um")], Limits(rate=0.002))
+    block, day = CompiledBlock(slow, tmp_path), failing()
+    rows = day.table[[c.name for c in block.tables.channels]].to_numpy(dtype=np.float64)
+    at, off, dt = 150, 3600.0, float(np.diff(day.time).min())
+    values = np.vstack([rows[:at], rows[at + round(off / dt) :]])
+    age, orders = np.zeros(len(values)), np.zeros((len(values), 2))
+    orders[0], orders[at] = (TOLD_COLD, 0.0), (RETAINED, off)
+    age[at : at + missing] = 1e9
+    steps = np.full(len(values), dt)
+    readings = Readings(values, age, steps, np.zeros(len(values)), orders[:, 0].astype(int), orders[:, 1])
+    found = block.run(readings)
+    check_same(replay(slow, block.tables, readings), found)
+    moved = np.abs(np.diff(found.correction[at - 1 :, 0]))
+    assert (moved[0] > 1.0) == (missing == 0)
+    assert (moved[1:] <= 0.002 * dt + 1e-9).all() == (missing != 1)

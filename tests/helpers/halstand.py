@@ -122,7 +122,8 @@ class HalStand:
         subprocess.run([*common, *STRICT, "-c", f"{comp.stem}.c", "-o", "made.o"], cwd=folder, check=True)
         HalStand._count += 1  # a library is loaded once by its name
         made = folder / f"{comp.stem}{HalStand._count}.so"
-        line = [*common, "stand.c", "made.o", "-fsanitize=undefined", "-lm", "-o", made.name]
+        # its own time(), not that of the C library of this process
+        line = [*common, "stand.c", "made.o", "-fsanitize=undefined", "-Wl,-Bsymbolic", "-lm", "-o", made.name]
         subprocess.run(line, cwd=folder, check=True)
         self._library = ctypes.CDLL(str(made))
         self._file = ctypes.create_string_buffer(state_file.encode())

@@ -8,8 +8,8 @@ _POWER = """The temperatures of a warm machine must not become the zero. After a
 
 1. **A retained state continues**, if it is undamaged, of the same models, and the time without power is given: more
    than 0 and at most {day:g} h. The slow states of the models move on by this time, with the present inputs. After more
-   than {hold:g} s without power the corrections take their new values at once, as no axis is referenced yet; otherwise
-   they continue from the retained ones.
+   than {hold:g} s without power the corrections take their new values at once, as no axis is referenced yet; otherwise,
+   and without usable readings in the first {reading_age:g} s, they continue from the retained ones at their rate.
 2. **The machine was off for more than {cold:.1f} h**: it is cold, and starts by itself.
 3. **It is told cold**: by a person, or by a signal that is TRUE on a cold machine only. The temperatures from then on
    become the zero, {wait}.
@@ -60,6 +60,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         "power": _POWER.format(
             of=of,
             hold=compensator.limits.hold,
+            reading_age=compensator.limits.reading_age,
             day=float(tables.values["resumable"]) / 3600.0,
             cold=float(tables.values["cold_after"]) / 3600.0,
             wait=f"within {zeroing.at_rest:g} s" if tables.sizes["has_zero"] else "at once",

@@ -92,7 +92,8 @@ def replay(
         before = state
         state, said = compensator.step(state, reading, tick)
         state, said = take_at_once(compensator, before, state, said, resumed)
-        resumed = {t for t in resumed if said.states[t].word not in ("active", "shadow")}
+        waits = {t for t, idle in state.idle.items() if idle <= compensator.limits.reading_age}
+        resumed = {t for t in resumed & waits if said.states[t].word == "holding"}
         if starting and not said.rejected:
             warm = machine_seems_warm(compensator, state)
         for target in [t for t in waiting if t in state.raw]:

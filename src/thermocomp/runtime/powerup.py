@@ -98,7 +98,8 @@ def take_at_once(
     """Return a step in which the corrections of some targets reach their models at once, as far as these are active.
 
     For the first step after more than `Limits.hold` without power, when no axis is referenced yet: the retained
-    correction may be that of a machine that was warm hours ago.
+    correction may be that of a machine that was warm hours ago. If no reading can be used for `Limits.reading_age`, the
+    axes may be in use by then, and the correction moves at its rate.
     """
     limits, lines = compensator.limits, compensator.lines
     found = dict(after.corrections)

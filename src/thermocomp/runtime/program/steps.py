@@ -61,6 +61,8 @@ def step(s: Kept, w: Work, t: Constants) -> None:
             idle(s, w, t, k)
         with otherwise():
             s.idle[k] = 0.0
+        with when(~s.status[k].equals(HOLDING) | (s.idle[k] > t.reading_age)):
+            s.resumed[k] = False
         powering.obey(s, w, t, k)
 
 
@@ -214,7 +216,6 @@ def drive(s: Kept, w: Work, t: Constants, k: Whole) -> None:
         w.tilt = 0.0
         band.set(0.0)
     travel = let("travel", choose(s.resumed[k], AT_ONCE, w.travel))
-    s.resumed[k] = False
     low = let("low", t.travel_low[k] - t.position[k])
     high = let("high", t.travel_high[k] - t.position[k])
     with when((low >= high) | (w.tilt.equals(0.0) & s.slope[k].equals(0.0))):
