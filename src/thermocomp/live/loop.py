@@ -235,7 +235,7 @@ class Service:
         return why if self.clock.tick() - at <= 10.0 * self.clock.speed else ""
 
     def unread(self) -> list[str]:
-        """Return what was received for channels in use and is no number, with its source."""
+        """Return what was received for channels in use and is not a number, with its source."""
         ends = [(one.name, getattr(one.end, "unread", {}).items()) for one in self.inlets]
         every = [(name, text, where) for where, items in ends for name, text in items if name in self.latest.used]
         return [f"{n}: received {text} from {where}, expected a number, not in quotes" for n, text, where in every]

@@ -34,7 +34,7 @@ def read_message(
     arrived : float
         Present time of the clock [s], used if the message has no time.
     unread : dict of str to str, optional
-        Channels whose last value was no number, and that value; updated.
+        Channels whose last value was not a number, and that value; updated.
     """
     content = _table(payload, '{"t1_C": 21.3}')
     if len(content) > MOST_VALUES:

@@ -103,7 +103,7 @@ class MqttSource(Broker):
     counter: str = ""
     refused: int = field(default=0, init=False)  #: number of invalid messages
     last_refusal: str = field(default="", init=False)
-    unread: dict[str, str] = field(default_factory=dict, init=False)  #: channels whose last value was no number
+    unread: dict[str, str] = field(default_factory=dict, init=False)  #: channels whose last value was not a number
     _inbox: Inbox | None = field(default=None, init=False, repr=False)
     _changes: ReportedChanges | None = field(default=None, init=False, repr=False)
 
