@@ -20,7 +20,11 @@ def explain(found: Explanations, face: CommandFace) -> int:
     int
         0 done, 2 unusable input.
     """
-    face.answer(found.to_dict, lambda: _answer(found.models, face), lambda: _print(found))
+    face.answer(
+        found.to_dict,
+        lambda: answer_models(found.models, face.following("export", to="c99", output=free("c99"))),
+        lambda: _print(found),
+    )
     return 0
 
 
@@ -29,7 +33,19 @@ def _print(found: Explanations) -> None:
         console.print(words(line), soft_wrap=True)
 
 
-def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
+def answer_models(
+    models: Sequence[Explanation], following: Sequence[str], files: Sequence[object] = ()
+) -> CommandAnswer:
+    """Return what is in a model file, on what it leans, and what happens if a sensor fails.
+
+    Parameters
+    ----------
+    models : sequence of Explanation
+    following : sequence of str
+        Words of the next command if a model may run.
+    files : sequence
+        Files written.
+    """
     accepted = [e.target for e in models if e.word.startswith("accepted")]
     inputs = {s.name: s.quantity for e in models for s in e.sensors}
     heat = sum(quantity == "temperature" for quantity in inputs.values())
@@ -42,7 +58,8 @@ def _answer(models: Sequence[Explanation], face: CommandFace) -> CommandAnswer:
         table=Layout(_COLUMNS, models),
         lines=[*_failing(models), *spares_of(models)],
         warnings=[f"{e.target}: {e.word}, {e.reason}" for e in models if e.target not in accepted],
-        following=face.following("export", to="c99", output=free("c99")) if accepted else (),
+        files=files,
+        following=following if accepted else (),
     )
 
 

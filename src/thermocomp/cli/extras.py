@@ -9,6 +9,7 @@ from thermocomp.core.exceptions import MissingExtraError
 EXTRAS: dict[str, tuple[str, ...]] = {
     "study": ("jinja2", "joblib", "matplotlib", "openpyxl", "pandas", "pyarrow", "scipy", "sklearn"),
     "live": ("aiomqtt", "fastapi", "jinja2", "uvicorn"),
+    "app": ("fastapi", "jinja2", "tomlkit", "uvicorn"),
     "opcua": ("asyncua",),
     "files": ("h5py", "matio", "nptdms"),
     "onnx": ("onnx",),

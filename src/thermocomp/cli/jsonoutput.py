@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import Any
 
@@ -14,11 +15,15 @@ called_with: list[str] = []
 
 def print_json(content: dict[str, Any]) -> None:
     """Print results as JSON, with the version and the settings."""
-    content = {"thermocomp": __version__, "arguments": called_with, **content}
+    sys.stdout.write(as_text({"arguments": called_with, **content}))
+
+
+def as_text(content: Mapping[str, Any]) -> str:
+    """Return results as JSON text, with the version."""
     # JSON has no nan and no infinity: unknown values are null
-    text = json.dumps(_nulled(content), indent=2, ensure_ascii=False)
+    text = json.dumps(_nulled({"thermocomp": __version__, **content}), indent=2, ensure_ascii=False)
     # characters unfit for terminals, and undecodable bytes of names, are written as JSON escapes
-    sys.stdout.write("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n")
+    return "".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text) + "\n"
 
 
 def _nulled(value: Any) -> Any:

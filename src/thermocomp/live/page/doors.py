@@ -97,10 +97,12 @@ class Door:
     ----------
     names : collection of str
         Host names of the page, in addition to ``localhost`` and the addresses of this computer.
+    most : int
+        Maximum size of a request [bytes].
     """
 
-    def __init__(self, app: ASGIApp, names: Collection[str] = ()) -> None:
-        self._app = app
+    def __init__(self, app: ASGIApp, names: Collection[str] = (), most: int = MOST_BYTES) -> None:
+        self._app, self._most = app, most
         self._names = {"localhost", *map(_as_browsers_write, names)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -108,7 +110,8 @@ class Door:
 
         async def answer(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(_HEADERS)
+                for name, value in _HEADERS.items():
+                    MutableHeaders(scope=message).setdefault(name, value)
             await send(message)
 
         app = self._app
@@ -126,10 +129,10 @@ class Door:
         if not shows and (why := explain_foreign(request)):
             return 403, why
         length = headers.get("content-length", "0")
-        if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > MOST_BYTES:
-            return 413, f"a request has at most {MOST_BYTES} bytes"
+        if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > self._most:
+            return 413, f"a request has at most {self._most} bytes"
         if "transfer-encoding" in headers:
-            return 413, f"a request has at most {MOST_BYTES} bytes, and states its length (Content-Length)"
+            return 413, f"a request has at most {self._most} bytes, and states its length (Content-Length)"
         return None
 
 

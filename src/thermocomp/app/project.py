@@ -1,0 +1,223 @@
+"""Projects: a folder with ``project.toml``, its recordings and mappings, and the results of each run."""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, make_dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from thermocomp import __version__
+from thermocomp.api.verbs import compare
+from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.reduction.options import ReductionOptions
+from thermocomp.files.plaintext import find_keys, list_errors, strict_adapter
+from thermocomp.files.tomlfile import as_json, read_toml
+
+#: name of the settings file of a project
+NAME = "project.toml"
+#: parameters of `compare` that a project gives elsewhere
+_ELSEWHERE = ("recordings", "mapping", "starts", "limits", "scheduler", "progress")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProjectRecording:
+    """A recording of a project.
+
+    Parameters
+    ----------
+    file, mapping : str
+        Paths relative to the project's folder; the mapping may be empty.
+    """
+
+    file: str
+    mapping: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JoinOptions:
+    """Table ``[join]``: the recordings are those of several loggers in the same hours, see `thermocomp.join`.
+
+    Parameters
+    ----------
+    offset : tuple of float
+        Seconds by which the clock of each recording after the first is ahead; empty: as estimated.
+    """
+
+    offset: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """Table ``[fit]``: see `thermocomp.api.results.Compared.fit`.
+
+    Parameters
+    ----------
+    model : mapping of str to str
+        Methods written instead of the recommended ones, by target.
+    accept_unproven : str
+        Person who approves the use of unproven models, and the reason.
+    """
+
+    model: Mapping[str, str] = field(default_factory=dict)
+    accept_unproven: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions(ReductionOptions):
+    """Table ``[export]``: see `thermocomp.export`.
+
+    Parameters
+    ----------
+    to : str
+        Output format.
+    name, dialect : str
+        Name of the files; dialect of structured text.
+    """
+
+    to: str
+    name: str = "thermal"
+    dialect: str = ""
+
+
+def _compare_options() -> type:
+    """Return the type of the table ``[compare]``: the keywords of `thermocomp.compare`, with their types."""
+    parameters = inspect.signature(compare).parameters
+    taken = [(n, p.annotation, field(default=p.default)) for n, p in parameters.items() if n not in _ELSEWHERE]
+    return make_dataclass("CompareOptions", taken, frozen=True, kw_only=True)
+
+
+CompareOptions: Any = _compare_options()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Content of ``project.toml``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the project, for its page.
+    recordings : tuple of ProjectRecording
+        Recordings to learn from.
+    compare : CompareOptions
+        Keywords of `thermocomp.compare`.
+    limits : Limits
+        Limits of the corrections, applied while the models are judged, and of the exported code.
+    export : ExportOptions, optional
+        Default: nothing is exported.
+    assess : tuple of ProjectRecording
+        Recordings on which the fitted model is assessed.
+    """
+
+    name: str = ""
+    recordings: tuple[ProjectRecording, ...] = ()
+    join: JoinOptions | None = None
+    compare: CompareOptions = field(default_factory=CompareOptions)
+    limits: Limits = Limits()
+    fit: FitOptions = FitOptions()
+    export: ExportOptions | None = None
+    assess: tuple[ProjectRecording, ...] = ()
+
+
+@cache
+def _adapter() -> TypeAdapter[Settings]:
+    return strict_adapter(Settings)
+
+
+def settings_of(content: Mapping[str, Any], source: str | Path) -> Settings:
+    """Return validated settings.
+
+    Parameters
+    ----------
+    content : mapping
+        Content of a TOML file.
+    source : str or Path
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        A key is unknown or a value has the wrong type; all errors are listed.
+    """
+    try:
+        return _adapter().validate_json(as_json(dict(content)))
+    except ValidationError as e:
+        told = []
+        for error in e.errors(include_url=False):
+            *_, last = error["loc"]
+            keys = ".".join(map(str, find_keys(error["loc"], content)))
+            match error["type"]:
+                case "unexpected_keyword_argument" | "extra_forbidden":
+                    told.append(f"{keys}: this key does not exist")
+                case "missing" | "missing_argument":
+                    told.append(f"{f'{keys}.' if keys else ''}{last}: this key is missing")
+                case _:
+                    told.append(f"{keys} = {error['input']!r:.60}: {error['msg']}")
+        raise InputError(list_errors(source, told)) from e
+
+
+class Project:
+    """A project: its folder and its settings.
+
+    Parameters
+    ----------
+    path : Path
+        The folder, or its ``project.toml``.
+
+    Raises
+    ------
+    InputError
+        The settings cannot be read.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        given = Path(path)
+        self.file = given / NAME if given.is_dir() else given
+        self.folder = self.file.parent
+        self.content = read_toml(self.file, "project file")
+        self.settings = settings_of(self.content, self.file)
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file named in the settings.
+
+        Raises
+        ------
+        InputError
+            The file is not in the project's folder: a project that is copied must stay whole.
+        """
+        found = self.folder / name
+        if not found.resolve().is_relative_to(self.folder.resolve()):
+            raise InputError(f"{self.file}: {name}: the file is not in the project's folder; copy it there")
+        return found
+
+    def key_of(self, tables: Sequence[str], recordings: Sequence[ProjectRecording]) -> str:
+        """Return the SHA-256 of what determines a result: version, tables of the settings, recordings, mappings."""
+        parts = {name: self.content.get(name) for name in tables}
+        whole = sha256(f"{__version__}\n{as_json(parts)}".encode())
+        for path in (self.path(name) for r in recordings for name in (r.file, r.mapping) if name):
+            try:
+                with path.open("rb") as file:
+                    while part := file.read(1 << 20):
+                        whole.update(part)
+            except OSError as e:
+                raise InputError(f"{self.file}: {path.name}: the file cannot be read: {e.strerror}") from e
+        return whole.hexdigest()
+
+    def fingerprint(self) -> str:
+        """Return the key of the comparison and the fitted models."""
+        return self.key_of(("recordings", "join", "compare", "limits", "fit"), self.settings.recordings)
+
+
+def given(options: Any, leave: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the values of a table as keywords, without some and without empty texts."""
+    values = {f.name: getattr(options, f.name) for f in fields(options) if f.name not in leave}
+    return {name: value for name, value in values.items() if value != ""}
+
+
+#: called with a line of text after each task
+Progress = Callable[..., object]

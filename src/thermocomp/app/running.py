@@ -1,0 +1,222 @@
+"""A run of a project: the verbs of the command line in their order, with their results in a folder of its own."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from thermocomp import __version__
+from thermocomp.api.check import check
+from thermocomp.api.inputs import read
+from thermocomp.api.join import join
+from thermocomp.api.results import Compared, FittedModels
+from thermocomp.api.verbs import assess, compare
+from thermocomp.app.project import NAME, Project, ProjectRecording, given
+from thermocomp.app.runfolder import RunFolder, Step, new_run, runs_of
+from thermocomp.cli.answers import free
+from thermocomp.cli.jsonoutput import as_text
+from thermocomp.core.exceptions import InputError
+from thermocomp.export.target import find_target
+from thermocomp.export.verbs import export
+from thermocomp.files.draft import write_text
+from thermocomp.recordings.recording import Recording
+
+#: minimum time between two writes of the progress [s]
+OFTEN = 0.5
+
+
+class Progress:
+    """Progress of a verb, in the state of a run.
+
+    Parameters
+    ----------
+    tell : callable
+        Also called with each line of text.
+    """
+
+    def __init__(self, folder: RunFolder, tell: Callable[..., object]) -> None:
+        self._folder, self._tell, self._next = folder, tell, 0.0
+
+    def begin(self, total: int) -> None:
+        """Set the total number of tasks."""
+        self._folder.state.total = total
+        if begin := getattr(self._tell, "begin", None):
+            begin(total)
+
+    def warn(self, lines: list[str]) -> None:
+        """Report data-quality problems."""
+        if warn := getattr(self._tell, "warn", None):
+            warn(lines)
+
+    def __call__(self, text: str, /, steps: int = 1) -> None:
+        """Report a task and the number of steps completed."""
+        state = self._folder.state
+        state.task, state.done = text, state.done + steps
+        self._tell(text, steps)
+        if time.monotonic() >= self._next:
+            self._folder.save()
+            self._next = time.monotonic() + OFTEN
+
+
+def run_project(project: Project, tell: Callable[..., object], *, again: bool = False) -> "Run":
+    """Run a project: continue its last run if nothing has changed since, else in a new folder.
+
+    Parameters
+    ----------
+    project : Project
+    tell : callable
+        Receives the progress; see `Progress`.
+    again : bool
+        Start a new run in any case.
+
+    Returns
+    -------
+    Run
+        Finished; one that was finished before is returned as it is.
+
+    Raises
+    ------
+    InputError
+        A step cannot be done; the reason is also in the folder of the run.
+    """
+    fingerprint = project.fingerprint()
+    last = next(reversed(runs_of(project.folder)), None)
+    found = {} if last is None else last.read()
+    if last is None or again or found["fingerprint"] != fingerprint or found["state"] == "failed":
+        folder = new_run(project.folder)
+        folder.state.fingerprint, folder.state.version = fingerprint, __version__
+    else:
+        folder = last
+        if found["state"] == "running":
+            raise InputError(f"{folder.path}: this run is going on in another process; stop that one first")
+        folder.take_up()
+    write_text(project.file.read_text(encoding="utf-8"), folder.path / NAME, overwrite=True)
+    run = Run(project, folder, tell)
+    run.work()
+    return run
+
+
+class Run:
+    """A run of a project.
+
+    Parameters
+    ----------
+    project : Project
+    folder : RunFolder
+    tell : callable
+        Receives the progress; see `Progress`.
+    """
+
+    def __init__(self, project: Project, folder: RunFolder, tell: Callable[..., object]) -> None:
+        self.project, self.folder, self.tell = project, folder, tell
+        self.settings = project.settings
+        self.compared: Compared | None = None
+        self.fitted: FittedModels | None = None
+
+    def work(self) -> None:
+        """Execute the steps that are not finished.
+
+        Raises
+        ------
+        InputError
+            A step cannot be done.
+        KeyboardInterrupt
+            The run was stopped.
+        """
+        with self.folder.working():
+            if not self._has("fit"):
+                self._learn()
+            if self.settings.export is not None:
+                self._step("export", self._export, self.project.key_of(("export", "limits"), ()))
+            if self.settings.assess:
+                self._step("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
+
+    def _learn(self) -> None:
+        tests = self._recordings()
+        self._step("check", lambda: self._check(tests))
+        self._forget("compare")  # it was interrupted before the models were fitted, which needs its result
+        self._step("compare", lambda: self._compare(tests))
+        self._step("fit", self._fit)
+
+    def _recordings(self) -> list[Recording]:
+        tests = self._read(self.settings.recordings)
+        if self.settings.join is None:
+            return tests
+        joined = self.folder.path / "joined.parquet"
+        offset = self.settings.join.offset or None
+        if not self._has("join"):
+            found = join(tests, offset=offset)
+            self._step("join", lambda: self._write(found, (found.save, joined.name)))
+        return [read(joined)]
+
+    def _read(self, named: Sequence[ProjectRecording]) -> list[Recording]:
+        if not named:
+            raise InputError(f"{self.project.file}: it names no recording: add a table [[recordings]] with a file")
+        path = self.project.path
+        return [read(path(r.file), path(r.mapping) if r.mapping else None) for r in named]
+
+    def _check(self, tests: list[Recording]) -> tuple[list[str], str]:
+        found = check(tests)
+        return self._write(found, (found.report, "check.html"))
+
+    def _compare(self, tests: list[Recording]) -> tuple[list[str], str]:
+        options = given(self.settings.compare)
+        self.compared = found = compare(tests, limits=self.settings.limits, progress=self._progress(), **options)
+        files = self._write(found, (found.report, "comparison.html"))
+        if found.comparison.left:
+            raise KeyboardInterrupt
+        return files
+
+    def _fit(self) -> tuple[list[str], str]:
+        assert self.compared is not None
+        fit = self.settings.fit
+        self.fitted = found = self.compared.fit(dict(fit.model), accept_unproven=fit.accept_unproven or None)
+        return self._write(found, (found.save, "model.json"))
+
+    def _export(self) -> tuple[list[str], str]:
+        options = self.settings.export
+        assert options is not None
+        reduced = self._read(self.settings.recordings) if find_target(options.to).shape else None
+        found = export(self._model, options.to, reduced, limits=self.settings.limits, **given(options, ("to",)))
+        folder = free(str(self.folder.path / "-".join(["export", options.to, *filter(None, [options.dialect])])))
+        found.save(folder)
+        told = [f"{target} is left out: {why}" for target, why in {**found.refused, **found.elsewhere}.items()]
+        return [f"{folder.name}/{name}" for name in found.files], ". ".join([*filter(None, [found.verdict]), *told])
+
+    def _assess(self) -> tuple[list[str], str]:
+        tests = self._read(self.settings.assess)
+        found = assess(self._model, tests, limits=self.settings.limits, progress=self._progress())
+        return self._write(found, (found.report, free(str(self.folder.path / "assessment.html")).name))
+
+    @property
+    def _model(self) -> Path:
+        return self.folder.path / "model.json"
+
+    def _progress(self) -> Progress:
+        return Progress(self.folder, self.tell)
+
+    def _write(self, found: Any, *written: tuple[Callable[..., object], str]) -> tuple[list[str], str]:
+        """Write the files of a result, and its JSON; return their names and the result as text."""
+        for writer, name in written:
+            writer(self.folder.path / name, overwrite=True)
+        name = f"{self.folder.state.step}.json"
+        write_text(as_text(found.to_dict()), self.folder.path / name, overwrite=True)
+        return [*(n for _, n in written), name], str(found)
+
+    def _has(self, name: str, key: str = "") -> bool:
+        return any((s.name, s.key) == (name, key) for s in self.folder.state.steps)
+
+    def _forget(self, name: str) -> None:
+        self.folder.state.steps = [s for s in self.folder.state.steps if s.name != name]
+
+    def _step(self, name: str, work: Callable[[], tuple[list[str], str]], key: str = "") -> None:
+        """Execute a step unless an earlier process has finished it with the same settings."""
+        if self._has(name, key):
+            return
+        state, began = self.folder.state, time.time()
+        state.step, state.step_began, state.task, state.done, state.total = name, began, "", 0, 0
+        self.folder.save()
+        files, text = work()
+        state.steps.append(Step(name, round(time.time() - began, 1), files, text, key))
+        state.step = state.task = ""
+        self.folder.save()

@@ -1,0 +1,222 @@
+"use strict";
+// The page of a project: it shows what the server tells, and asks it for everything that is done. make, css, show: curves.js
+const $ = id => document.getElementById(id);
+const KINDS = { temperature: "temperature", displacement: "deviation or displacement", spindle_speed: "spindle speed", position: "axis position", angle: "angle", feed: "feed", cycle: "label of cycles", ignore: "ignore" };
+const UNITS = { temperature: ["degC", "degF", "K"], displacement: ["um", "mm", "in", "nm"], spindle_speed: ["1/min", "Hz"], position: ["mm", "um", "in"], angle: ["urad", "deg"], feed: ["mm/min"] };
+const METHODS = ["ols", "partial-f", "mra", "dynamic", "averaged", "grouping", "subsets", "ace", "ace-monotone", "mlp", "ridge", "pcr", "pls", "lasso", "ppr"], USUAL = 5;
+const UNIT = { cycle: "thermal cycles", day: "days", file: "files" };
+const TARGETS = { c99: "C99 (DSP, PLC, computer)", st: "structured text, CODESYS", "st twincat": "structured text, TwinCAT", "st scl": "structured text, Siemens TIA", "st iec": "structured text, IEC 61131-3 second edition", siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", klipper: "Klipper", onnx: "ONNX" };
+let state = null, seen = {}, drawn = 0, shownRun = "", figures = 0;
+
+function alarm(text = "") { $("alarm").textContent = text; $("alarm").hidden = !text; if (text) $("alarm").scrollIntoView({ block: "nearest" }); }
+function element(tag, text = "", kind = "", ...inner) { const e = make(tag, kind, text); e.append(...inner); return e; }
+function button(text, run, kind = "") { const b = element("button", text, kind); b.type = "button"; b.addEventListener("click", run); return b; }
+async function api(path, method = "GET", body, raw = false) {
+  alarm();
+  const sent = body === undefined ? {} : raw ? { body } : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+  let answer;
+  try { answer = await fetch(path, { method, ...sent }); } catch { alarm("The page has lost its server: start thermocomp app again."); throw new Error("lost"); }
+  const content = await answer.json().catch(() => ({ detail: `the server answered ${answer.status}` }));
+  if (!answer.ok) { alarm(typeof content.detail === "string" ? content.detail : JSON.stringify(content.detail)); throw new Error("refused"); }
+  return content;
+}
+const quietly = work => (...given) => Promise.resolve(work(...given)).catch(e => { if (!["lost", "refused"].includes(e.message)) alarm(String(e)); });
+const place = name => "api/recordings/" + name.split("/").map(encodeURIComponent).join("/");
+
+// -- files -------------------------------------------------------------------------------------------------------------
+
+const dropFiles = quietly(async files => {
+  for (const file of files) {
+    $("busy").textContent = `Reading ${file.name} ...`;
+    try { const found = await api(`api/drop/${encodeURIComponent(file.name)}`, "PUT", file, true); seen[found.file] = found; } finally { $("busy").textContent = ""; }
+  }
+  render(await api("api/project"));
+});
+
+const answer = quietly(async (name, remedies) => {
+  $("busy").textContent = `Reading ${name} again ...`;
+  try { seen[name] = await api(place(name), "POST", remedies); } finally { $("busy").textContent = ""; }
+  draw(name);
+});
+
+const undo = quietly(async name => { seen[name] = await api("api/undo/" + name.split("/").map(encodeURIComponent).join("/"), "POST"); draw(name); });
+
+function choices(name, options) {
+  return element("ul", "", "", ...options.map(o => element("li", "", "", button("use this", () => answer(name, [o.remedy])), " ", element("code", o.toml.replaceAll("\n", "; ")))));
+}
+
+function draw(name) {  // the card of a recording
+  const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
+  card.replaceChildren(element("h2", name.replace(/^files\//, "")));
+  if (!found) { card.append(element("p", "reading ...", "quiet")); return; }
+  const undoing = found.mapping ? button("Undo the last change", () => undo(name)) : "";
+  if (found.error) {
+    card.append(element("p", found.error, "trouble"), found.options.length ? element("p", "Which of these is right?") : element("p", "This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading.", "quiet"), choices(name, found.options), undoing);
+    return;
+  }
+  card.append(element("p", found.summary), element("div", "", "scroll", preview(name, found.columns)));
+  for (const q of found.questions) card.append(element("p", q.text, "warning"), choices(name, q.options));
+  if (found.findings.length) card.append(element("h3", "Found in the data"), element("ol", "", "", ...found.findings.map(f => {
+    const line = element("li", "", f.severity, element("strong", f.severity + " "), `${f.channel} ${f.text} `);
+    if (f.toml) { const repair = button("repair", () => answer(name, [f.remedy])); repair.title = f.toml; line.append(repair); }
+    return line;
+  })));
+  if (found.mapping) card.append(element("details", "", "", element("summary", "Mapping: what was changed in reading this file"), element("pre", found.mapping)), undoing);
+  const figure = element("figure"), script = element("script", JSON.stringify(found.panels));
+  script.type = "application/json"; figure.append(script); card.append(figure);
+  if (found.panels.length) show(figure, figures++);
+  judgeForm();
+}
+
+function preview(name, columns) {
+  const heads = columns.map(c => element("th", "", "", button(c.heading || `column ${c.number}`, () => changeColumn(name, c)), element("span", c.kind === "ignored" ? "ignored" : `${KINDS[c.kind] || c.kind}${c.unit ? ` [${c.unit}]` : ""}`, `kind ${c.kind}`)));
+  const rows = [0, 1, 2, 3].map(k => element("tr", "", "", ...columns.map(c => element("td", c.cells[k] ?? "", "n"))));
+  return element("table", "", "", element("thead", "", "", element("tr", "", "", ...heads)), element("tbody", "", "", ...rows));
+}
+
+function changeColumn(name, c) {  // dialog: quantity, unit, sensitivity
+  const box = element("dialog"), role = element("select"), unit = element("select"), scale = element("input"), was = KINDS[c.kind] ? c.kind : "ignore";
+  for (const [key, text] of Object.entries(KINDS)) role.append(new Option(text, key, false, key === was));
+  const units = () => unit.replaceChildren(...(UNITS[role.value] || []).map(u => new Option(u, u, false, u === c.unit)));
+  role.addEventListener("change", units); units();
+  scale.type = "number"; scale.step = "any"; scale.value = c.scale;
+  const close = () => box.close(), label = (text, e) => element("label", text + " ", "", e);
+  const save = button("Change", () => {
+    const channel = c.channel || c.heading.replace(/[^\p{L}\p{N}_-]+/gu, "_") || `column_${c.number}`, own = columnsOf(name).filter(o => o.heading === c.heading).length === 1;
+    const said = role.value === "ignore" || role.value === "cycle" ? { role: role.value } : { role: role.value, unit: unit.value, scale: Number(scale.value) };
+    close(); answer(name, [{ columns: { [channel]: { column: own ? c.heading : c.number, ...said } } }]);
+  }, "main");
+  box.append(element("h2", c.heading || `column ${c.number}`), element("p", "", "", label("This column is", role), label("in", unit), label("number in the file times", scale)),
+    element("p", "A voltage needs its sensitivity: 25 um per volt is 25, in um.", "quiet"), element("p", "", "", save, " ", button("Cancel", close)));
+  box.addEventListener("close", () => box.remove());
+  document.body.append(box); box.showModal();
+}
+const columnsOf = name => (seen[name] && seen[name].columns) || [];
+
+const files = quietly(async () => {
+  const named = (state.settings.recordings || []).map(r => r.file), box = $("recordings");
+  for (const card of [...box.children]) if (!named.includes(card.dataset.file)) card.remove();
+  for (const name of named) {
+    if (box.querySelector(`[data-file="${CSS.escape(name)}"]`)) continue;
+    const card = element("article", "", "card"); card.dataset.file = name; box.append(card); draw(name);
+    if (!seen[name]) { seen[name] = await api(place(name)); draw(name); }
+  }
+  $("to-judge").hidden = !named.length;
+});
+
+// -- judging -----------------------------------------------------------------------------------------------------------
+
+function boxes(id, names, chosen, kind = "checkbox") {
+  $(id).replaceChildren(...names.map(([value, text]) => {
+    const input = element("input"); input.type = kind; input.name = id; input.value = value; input.checked = chosen.includes(value);
+    return element("label", "", "", input, ` ${text}`);
+  }));
+}
+
+function judgeForm() {  // only what is not yet shown: a choice of the user stays
+  const compare = state.settings.compare || {}, names = [...new Set(Object.values(seen).flatMap(s => s.targets || []))];
+  if ([...document.querySelectorAll("#targets input")].map(i => i.value).join() !== names.join()) boxes("targets", names.map(n => [n, n]), compare.targets || names);
+  if (!$("methods").children.length) boxes("methods", METHODS.map(n => [n, n]), compare.models || METHODS.slice(0, USUAL));
+  if (!$("units").children.length) boxes("units", Object.entries(UNIT), [compare.leave_one || "cycle"], "radio");
+}
+const chosen = id => [...document.querySelectorAll(`#${id} input:checked`)].map(i => i.value);
+
+const startRun = quietly(async event => {
+  event.preventDefault();
+  const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
+  if (!targets.length || !models.length) return alarm("Choose at least one deviation and one method.");
+  for (const [key, value, usual] of [["targets", targets, targets.length === all], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
+  await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null });
+  await api(`api/runs?again=${$("again").checked}`, "POST");
+  $("again").checked = false; $("progress").textContent = "starting ...";
+});
+
+function minutes(s) { return s < 90 ? `${Math.max(1, Math.round(s))} s` : `${Math.round(s / 60)} min`; }
+
+function progress(run) {
+  const box = $("progress"), running = run && run.state === "running";
+  $("stop").hidden = !running;
+  if (!run) return box.replaceChildren();
+  if (!running) return box.replaceChildren(run.error ? element("p", `Run ${run.number} ${run.state}: ${run.error}`, run.state) : "");
+  const bar = element("progress"), spent = Date.now() / 1000 - run.step_began;
+  if (run.total) { bar.max = run.total; bar.value = run.done; }
+  const left = run.done > 2 ? `, about ${minutes(spent / run.done * Math.max(run.total - run.done, 0))} left` : "";
+  bar.setAttribute("aria-label", "progress");
+  box.replaceChildren(element("p", `Run ${run.number}: ${run.step || "reading"}${run.total ? `, ${run.done} of ${run.total} tasks${left}` : ""}. ${run.task}`), bar);
+}
+
+const number = v => v == null ? "–" : v.toFixed(2);
+const verdict = quietly(async run => {
+  if (!run || run.state !== "done" || shownRun === run.number + run.ended) return;
+  shownRun = run.number + run.ended;
+  const found = (await api(`api/runs/${run.number}`)).results, rows = (found.compare || {}).recommended || [], models = (found.fit || {}).models || [];
+  const head = ["deviation", "method", "verdict", "RMS with compensation [um]", "RMS without [um]", "why"];
+  const line = r => { const m = models.find(o => o.target === r.target) || {}; return [r.target, r.model || r.written || "none", m.verdict || r.verdict, number(m.rms_um ?? m.rms), number(m.none_rms_um ?? m.none_rms), m.reason || r.reason]; };
+  const body = rows.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
+  $("verdict").replaceChildren(element("h2", `Result of run ${run.number}, on unseen data`),
+    element("div", "", "scroll", element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
+    element("p", "", "", link(run, "comparison.html", "All methods, with curves and reasons"), " · ", link(run, "check.html", "Check of the data"), " · ", link(run, "model.json", "Model file")));
+  deployForm(run);
+});
+function link(run, name, text) { const a = element("a", text); a.href = `runs/${run.number}/${name.split("/").map(encodeURIComponent).join("/")}`; a.target = "_blank"; return a; }
+
+function runsTable(runs) {
+  $("runs").tBodies[0].replaceChildren(...[...runs].reverse().map(r => {
+    const files = r.steps.flatMap(s => s[2]).filter(f => f.endsWith(".html")), said = r.steps.filter(s => s[0] === "compare").map(s => s[3]).join(" ");
+    return element("tr", "", "", element("td", String(r.number)), element("td", r.state, r.state), element("td", r.began.replace("T", " ").slice(0, 16)), element("td", r.error || said), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
+  }));
+  $("command").textContent = state.command;
+}
+
+// -- deployment --------------------------------------------------------------------------------------------------------
+
+function deployForm(run) {
+  if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
+  const steps = run.steps.filter(s => s[0] === "export");
+  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s[2].length ? s[2][0].split("/")[0] : "nothing exported"), element("p", s[3]), element("ul", "", "", ...s[2].map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
+  if (!steps.length) $("package").append(element("p", "Nothing is exported yet.", "quiet"));
+}
+
+const exportModels = quietly(async event => {
+  event.preventDefault();
+  const [to, dialect] = $("to").value.split(" ");
+  await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
+  await api("api/runs", "POST");
+  $("package").replaceChildren(element("p", "exporting ...", "quiet"));
+});
+
+// -- the page ----------------------------------------------------------------------------------------------------------
+
+function render(found) {
+  state = found;
+  if (document.activeElement !== $("name")) $("name").value = state.settings.name || "";
+  const last = state.runs[state.runs.length - 1];
+  files(); judgeForm(); progress(last); runsTable(state.runs);
+  verdict([...state.runs].reverse().find(r => r.state === "done"));
+}
+
+function open(tab) {
+  for (const other of document.querySelectorAll("[role=tab]")) {
+    const own = other === tab;
+    other.setAttribute("aria-selected", own); other.tabIndex = own ? 0 : -1; $(other.getAttribute("aria-controls")).hidden = !own;
+  }
+  tab.focus();
+}
+
+const tabs = [...document.querySelectorAll("[role=tab]")];
+tabs.forEach((tab, k) => {
+  tab.addEventListener("click", () => open(tab));
+  tab.addEventListener("keydown", e => { const step = { ArrowRight: 1, ArrowLeft: -1 }[e.key]; if (step) open(tabs[(k + step + tabs.length) % tabs.length]); });
+});
+$("chosen").addEventListener("change", e => { dropFiles([...e.target.files]); e.target.value = ""; });
+for (const kind of ["dragover", "dragleave", "drop"]) $("drop").addEventListener(kind, e => { e.preventDefault(); $("drop").classList.toggle("over", kind === "dragover"); if (kind === "drop") dropFiles([...e.dataTransfer.files]); });
+$("to-judge").addEventListener("click", () => open($("tab-judge")));
+$("settings").addEventListener("submit", startRun);
+$("target").addEventListener("submit", exportModels);
+$("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs[state.runs.length - 1].number}`, "DELETE")));
+$("name").addEventListener("change", quietly(e => api("api/settings", "PUT", { name: e.target.value })));
+api("api/project").then(render).catch(() => 0);
+const events = new EventSource("api/events");
+events.addEventListener("message", e => render(JSON.parse(e.data)));
+events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
+events.addEventListener("open", () => alarm());

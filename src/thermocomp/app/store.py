@@ -1,0 +1,250 @@
+"""Files of a project as its page changes them: each version that is replaced is kept; loads no training code."""
+
+import asyncio
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from thermocomp.core.exceptions import InputError
+from thermocomp.files.draft import draft, write_text
+from thermocomp.files.plaintext import read_text
+from thermocomp.files.tomlfile import MOST
+
+NAME = "project.toml"
+#: largest file that can be dropped on the page [bytes]
+LARGEST = 1_000_000_000
+#: longest time for reading a file [s]
+PATIENCE = 120.0
+#: names of files that every system accepts
+_PLAIN = re.compile(r"[^\w .()+-]")
+_NEW = 'name = ""\n'
+
+
+class Store:
+    """Folder of a project.
+
+    Parameters
+    ----------
+    folder : Path
+        Created with an empty ``project.toml`` if missing.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written, or its ``project.toml`` is not TOML.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            (folder / "files").mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise InputError(f"{folder}: the project's folder cannot be written: {e.strerror}") from e
+        if not (folder / NAME).exists():
+            write_text(_NEW, folder / NAME, overwrite=False)
+        self.editing = asyncio.Lock()
+        self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
+        self.document()
+
+    def document(self) -> tomlkit.TOMLDocument:
+        """Return the settings, with their comments.
+
+        Raises
+        ------
+        InputError
+            The file is not TOML.
+        """
+        path = self.folder / NAME
+        try:
+            return tomlkit.parse(read_text(path, "project file", MOST))
+        except tomlkit.exceptions.TOMLKitError as e:
+            raise InputError(f"{path}: not valid TOML: {e}") from e
+
+    def content(self) -> dict[str, Any]:
+        """Return the settings."""
+        return self.document().unwrap()
+
+    async def save(self, document: tomlkit.TOMLDocument) -> None:
+        """Write settings after they have been validated.
+
+        Raises
+        ------
+        InputError
+            They are not valid.
+        """
+        await ask({"task": "settings", "content": document.unwrap()})
+        self.replace(NAME, tomlkit.dumps(document))
+
+    def replace(self, name: str, text: str) -> None:
+        """Write a text file; the version that it replaces is kept in ``history``."""
+        path = self.folder / name
+        if path.exists():
+            (self.folder / "history").mkdir(exist_ok=True)
+            kept = self._versions(name)
+            number = int(kept[-1].suffix[1:]) + 1 if kept else 1
+            write_text(path.read_text(encoding="utf-8"), self._version(name, number), overwrite=False)
+        write_text(text, path, overwrite=True)
+
+    def undo(self, name: str) -> None:
+        """Put the last replaced version of a file in its place.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        if not (kept := self._versions(name)):
+            raise InputError(f"{name}: there is no earlier version")
+        write_text(kept[-1].read_text(encoding="utf-8"), self.folder / name, overwrite=True)
+        kept[-1].unlink()
+
+    def _version(self, name: str, number: int) -> Path:
+        return self.folder / "history" / f"{Path(name).name}.{number}"
+
+    def _versions(self, name: str) -> list[Path]:
+        found = (self.folder / "history").glob(f"{Path(name).name.replace('[', '[[]')}.*")
+        return sorted((p for p in found if p.suffix[1:].isdigit()), key=lambda p: int(p.suffix[1:]))
+
+    # -- recordings ----------------------------------------------------------------------------------------------------
+
+    async def receive(self, name: str, parts: AsyncIterator[bytes]) -> str:
+        """Write a dropped file under a free name, and return its name in the project."""
+        path, plain = self._free(name), ""
+        with draft(path, overwrite=False) as target:
+            size = 0
+            with target.open("wb") as file:
+                async for part in parts:
+                    size += len(part)
+                    if size > LARGEST:
+                        raise InputError(f"{name}: the file has more than {LARGEST:,} bytes")
+                    file.write(part)
+        plain = f"files/{path.name}"
+        async with self.editing:
+            document = self.document()
+            recordings = document.setdefault("recordings", tomlkit.aot())
+            table = tomlkit.table()
+            table["file"] = plain
+            recordings.append(table)
+            await self.save(document)
+        return plain
+
+    def _free(self, name: str) -> Path:
+        """Return a path for a file: its name without signs that a system rejects, with a number if it exists."""
+        stem, suffix = Path(name.replace("\\", "/")).stem, Path(name).suffix
+        plain = _PLAIN.sub("_", stem).strip(" .")[:80] or "recording"
+        end, number = _PLAIN.sub("", suffix)[:12].lower(), 1
+        path = self.folder / "files" / f"{plain}{end}"
+        while path.exists():
+            number += 1
+            path = path.with_name(f"{plain}-{number}{end}")
+        return path
+
+    def entry(self, document: tomlkit.TOMLDocument, name: str) -> Any:
+        """Return the table of a recording in the settings.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        for list_of in ("recordings", "assess"):
+            for table in document.get(list_of, ()):
+                if table.get("file") == name:
+                    return table
+        raise InputError(f"{name}: the project has no such recording")
+
+    async def preview(self, name: str) -> dict[str, Any]:
+        """Return what a recording contains, see `thermocomp.app.worker.preview`; read again only if it has changed."""
+        table = self.entry(self.document(), name)
+        path, mapping = self.path(name), str(table.get("mapping", ""))
+        text = self._text(mapping)
+        with suppress(OSError):
+            known = (path.stat().st_mtime_ns, path.stat().st_size, text)
+            if (found := self._read.get(name)) is None or found[0] != known:
+                asked = await ask(
+                    {"task": "preview", "file": str(path), "mapping": text, "guess": False, "answers": []}
+                )
+                self._read[name] = found = (known, asked)
+            return found[1]
+        raise InputError(f"{name}: the file cannot be read")
+
+    async def answer(self, name: str, answers: list[Mapping[str, Any]], *, guess: bool) -> dict[str, Any]:
+        """Add entries to the mapping of a recording, and return its preview."""
+        async with self.editing:
+            table = self.entry(document := self.document(), name)
+            mapping = str(table.get("mapping", ""))
+            path, text = self.path(name), self._text(mapping)
+            found = await ask(
+                {"task": "preview", "file": str(path), "mapping": text, "guess": guess, "answers": answers}
+            )
+            if found["mapping"] != text:
+                self.replace(wanted := mapping or f"{name}.toml", found["mapping"])
+                if not mapping:
+                    table["mapping"] = wanted
+                    await self.save(document)
+            known = (path.stat().st_mtime_ns, path.stat().st_size, found["mapping"])
+            self._read[name] = (known, found)
+            return found
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file of the project.
+
+        Raises
+        ------
+        InputError
+            The file is elsewhere.
+        """
+        path = self.folder / name
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise InputError(f"{name}: the file is not in the project's folder")
+        return path
+
+    def _text(self, mapping: str) -> str:
+        return read_text(self.path(mapping), "mapping file", MOST) if mapping else ""
+
+
+async def ask(task: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the result of a task of `thermocomp.app.worker`.
+
+    Raises
+    ------
+    InputError
+        The task was refused, took too long, or ended without a result.
+    """
+    words = [sys.executable, "-m", "thermocomp.app.worker"]
+    pipe = asyncio.subprocess.PIPE
+    process = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe)
+    try:
+        out, said = await asyncio.wait_for(process.communicate(json.dumps(task).encode()), PATIENCE)
+    except TimeoutError as e:
+        raise InputError(f"reading took more than {PATIENCE:g} s; give a smaller file") from e
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    try:
+        found: dict[str, Any] = json.loads(out)
+    except ValueError as e:
+        last = said.decode(errors="replace").strip().rpartition("\n")[2]
+        raise InputError(f"the file could not be read: {last or 'the process ended without a word'}") from e
+    if "refused" in found:
+        raise InputError(found["refused"])
+    return found
+
+
+def start_run(folder: Path, *, again: bool) -> None:
+    """Start a run of a project as a process that does not end with this one."""
+    words = [sys.executable, "-m", "thermocomp", "run", str(folder), *(["--again"] if again else [])]
+    more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {}
+    nothing = subprocess.DEVNULL
+    log = (folder / "run.log").open("ab")
+    with log:
+        subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, **more)

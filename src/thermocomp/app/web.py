@@ -1,0 +1,186 @@
+"""Web application of a project: its files, runs and results, under an address that contains a token."""
+
+import asyncio
+import json
+import mimetypes
+import secrets
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import jinja2
+import tomlkit
+from fastapi import APIRouter, Body, FastAPI, Request
+from fastapi import Path as InPath
+from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
+from fastapi.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
+
+from thermocomp.app.runfolder import RunFolder, runs_of
+from thermocomp.app.store import LARGEST, Store, start_run
+from thermocomp.core.exceptions import InputError
+from thermocomp.live.page.doors import Door, Json
+
+_HERE = Path(__file__).parent
+#: time between two looks at the runs, for the event stream [s]
+OFTEN = 0.5
+#: pages of results have their own scripts; they must not reach the page of the project
+_ALONE = {"Content-Security-Policy": "sandbox allow-scripts allow-downloads", "X-Content-Type-Options": "nosniff"}
+
+
+def make_app(store: Store, token: str = "") -> FastAPI:
+    """Return the application that serves a project under ``/TOKEN/``.
+
+    Parameters
+    ----------
+    store : Store
+    token : str
+        Default: a random one.
+    """
+    token = token or secrets.token_urlsafe(24)
+    app = FastAPI(title="thermocomp app", docs_url=None, redoc_url=None, default_response_class=Json)
+    app.state.token = token
+    app.add_middleware(Door, most=LARGEST)
+    static = StaticFiles(directory=_HERE / "static", packages=[("thermocomp.report", "static")])
+    app.mount(f"/{token}/static", static)
+    app.include_router(_files(store), prefix=f"/{token}")
+    app.include_router(_results(store), prefix=f"/{token}")
+
+    @app.exception_handler(HTTPException)
+    async def refuse(_: Request, error: HTTPException) -> Json:
+        return Json({"detail": error.detail}, error.status_code, error.headers)
+
+    @app.exception_handler(InputError)
+    async def explain(_: Request, error: InputError) -> Json:
+        return Json({"detail": str(error)}, 422)
+
+    return app
+
+
+def _files(store: Store) -> APIRouter:
+    """Return the routes of the page, the settings and the recordings."""
+    router, loader = APIRouter(), jinja2.FileSystemLoader(_HERE / "templates")
+    template = jinja2.Environment(loader=loader, autoescape=True).get_template("app.html")
+
+    @router.get("/", response_class=HTMLResponse)
+    async def show() -> HTMLResponse:
+        return HTMLResponse(template.render(folder=str(store.folder.resolve())))
+
+    @router.get("/api/project")
+    async def tell() -> Json:
+        return Json(_state(store))
+
+    @router.put("/api/settings")
+    async def change(content: Annotated[dict[str, Any], Body()]) -> Json:
+        async with store.editing:
+            document = store.document()
+            for key, value in content.items():
+                if value is None:
+                    document.pop(key, None)
+                else:
+                    document[key] = value
+            await store.save(_encodable(document))
+        return Json(_state(store))
+
+    @router.put("/api/drop/{name}")
+    async def drop(name: str, request: Request) -> Json:
+        file = await store.receive(name, request.stream())
+        return Json({"file": file, **await store.answer(file, [], guess=True)})
+
+    @router.get("/api/recordings/{name:path}")
+    async def look(name: str) -> Json:
+        return Json({"file": name, **await store.preview(name)})
+
+    @router.post("/api/recordings/{name:path}")
+    async def answer(name: str, answers: Annotated[list[dict[str, Any]], Body()]) -> Json:
+        return Json({"file": name, **await store.answer(name, answers, guess=False)})
+
+    @router.post("/api/undo/{name:path}")
+    async def undo(name: str) -> Json:
+        async with store.editing:
+            store.undo(str(store.entry(store.document(), name).get("mapping", "")) or f"{name}.toml")
+        return Json({"file": name, **await store.preview(name)})
+
+    return router
+
+
+def _results(store: Store) -> APIRouter:
+    """Return the routes of the runs."""
+    router = APIRouter()
+
+    @router.post("/api/runs")
+    async def start(again: bool = False) -> Json:
+        if not store.content().get("recordings"):
+            raise InputError("the project has no recording: drop a file on the page first")
+        start_run(store.folder, again=again)
+        return Json({"started": True})
+
+    @router.delete("/api/runs/{number}")
+    async def stop(number: Annotated[int, InPath(ge=1, le=10**9)]) -> Json:
+        _run(store, number).ask_to_stop()
+        return Json({"asked": True})
+
+    @router.get("/api/runs/{number}")
+    async def result(number: Annotated[int, InPath(ge=1, le=10**9)]) -> Json:
+        folder = _run(store, number)
+        found = {n: _json(folder.path / f"{n}.json") for n in ("check", "compare", "fit", "assess")}
+        return Json({**folder.read(), "results": found})
+
+    @router.get("/runs/{number}/{name:path}")
+    async def file(number: Annotated[int, InPath(ge=1, le=10**9)], name: str) -> FileResponse:
+        path = (_run(store, number).path / name).resolve()
+        if not path.is_relative_to((store.folder / "runs" / str(number)).resolve()) or not path.is_file():
+            raise HTTPException(404, f"run {number} has no file {name}")
+        kind = mimetypes.guess_type(path.name)[0] or "text/plain"
+        return FileResponse(path, media_type=kind, headers=_ALONE)
+
+    @router.get("/api/events", response_class=StreamingResponse)
+    async def follow() -> StreamingResponse:
+        return StreamingResponse(_events(store), media_type="text/event-stream", headers={"Cache-Control": "no-store"})
+
+    return router
+
+
+async def _events(store: Store) -> AsyncIterator[bytes]:
+    """Return the state of the project whenever it has changed, and a comment every ten seconds."""
+    last, spoke = "", time.monotonic()
+    while True:
+        text = json.dumps(_state(store), default=str)
+        if text != last:
+            last, spoke = text, time.monotonic()
+            yield f"data: {text}\n\n".encode()
+        elif time.monotonic() - spoke > 10.0:
+            spoke = time.monotonic()
+            yield b": still here\n\n"
+        await asyncio.sleep(OFTEN)
+
+
+def _state(store: Store) -> dict[str, Any]:
+    runs = [r.read() for r in runs_of(store.folder)]
+    for run in runs:
+        run.pop("seen", None)
+    command = f"thermocomp run {store.folder}"
+    return {"folder": str(store.folder), "settings": store.content(), "runs": runs, "command": command}
+
+
+def _run(store: Store, number: int) -> RunFolder:
+    for run in runs_of(store.folder):
+        if run.number == number:
+            return run
+    raise HTTPException(404, f"there is no run {number}")
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _encodable(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
+    """Return settings that were changed by JSON, after a look whether TOML can hold them."""
+    try:
+        return tomlkit.parse(tomlkit.dumps(document))
+    except (tomlkit.exceptions.TOMLKitError, ValueError, TypeError) as e:
+        raise InputError(f"these settings cannot be written as TOML: {e}") from e

@@ -1,0 +1,141 @@
+"""Process that reads files for the page: one task as JSON on standard input, its result as JSON on standard output.
+
+Files of others are read here and not in the server: a file that takes too long or too much memory ends this process
+alone, and the training code is never loaded by the server.
+"""
+
+import json
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from thermocomp.core.exceptions import InputError
+
+#: first rows and columns shown, and points of a curve
+ROWS, COLUMNS, POINTS = 8, 200, 3000
+
+
+def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what a file contains, how its columns were understood, what is wrong with it, and its curves.
+
+    Parameters
+    ----------
+    file : str
+        Path of the recording.
+    mapping : str
+        TOML of its mapping, to which `answers` are added; it may be empty.
+    guess : bool
+        Take the best guess where something is unknown.
+    answers : list of mapping
+        Entries added to the mapping.
+
+    Returns
+    -------
+    dict
+        ``mapping`` is the new TOML. Of a file that cannot be read there are ``error`` and ``options``, the possible
+        entries of the mapping.
+    """
+    from thermocomp.recordings.checks.quality import check
+    from thermocomp.recordings.readers.mending import Draft, located, mend, take_best, to_toml
+    from thermocomp.recordings.readers.opening import open_table
+    from thermocomp.report import checks
+
+    draft = Draft(mapping)
+    for answer in answers:
+        draft.add(answer)
+    text = draft.text
+    try:
+        mended = mend(file, text, take_best if guess else lambda _: None)
+    except InputError as e:
+        message = str(e).removeprefix(f"{file}: ")
+        return {"mapping": text, "error": message, "options": [_option(r, to_toml(r)) for r in e.remedies]}
+    recording, whole = mended.recording, Draft(mended.text).mapping(file)
+    findings = check(recording)
+    table = open_table(file, whole)[0]
+    ways = [located(f, recording, whole, table.headings) if f.remedy else {} for f in findings]
+    return {
+        "mapping": mended.text,
+        "summary": str(recording).removeprefix("<Recording ").removesuffix(">"),
+        "columns": _columns(table, whole),
+        "questions": [
+            {"text": q.text, "severity": q.severity, "options": [_option(o, to_toml(o)) for o in q.options]}
+            for q, answer in mended.decided
+            if answer is None and q.severity in ("error", "column")
+        ],
+        "findings": [
+            {"severity": f.severity, "channel": f.channel, "text": f.text, **_option(way, to_toml(way) if way else "")}
+            for f, way in zip(findings, ways, strict=True)
+        ],
+        "notes": [*recording.notes, *recording.changed],
+        "targets": [c.name for c in recording.displacements],
+        "inputs": [c.name for c in (*recording.temperatures, *recording.of_quantity("spindle_speed"))],
+        "panels": checks.panels(recording, findings, POINTS),
+    }
+
+
+def settings(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an empty dict if settings of a project are valid.
+
+    Raises
+    ------
+    InputError
+        They are not.
+    """
+    from thermocomp.app.project import NAME, settings_of
+
+    settings_of(content, NAME)
+    return {}
+
+
+def _option(remedy: Mapping[str, Any], text: str) -> dict[str, Any]:
+    return {"remedy": remedy, "toml": text}
+
+
+def _columns(table: Any, mapping: Any) -> list[dict[str, Any]]:
+    """Return the first columns of a file: heading, first cells, and how they are understood."""
+    from thermocomp.recordings.readers.columns import plan
+
+    planned = plan(table, mapping)
+    channels = {c.index: c for c in planned.columns}
+    times = {planned.times.time, planned.times.date, *planned.beside}
+    numbers = [k for k, _ in enumerate(table.headings[:COLUMNS]) if table.is_number(k, empty=False)]
+    values, _ = table.load([k for k in numbers if k in channels], [])
+    found = []
+    for k, heading in enumerate(table.headings[:COLUMNS]):
+        c = channels.get(k)
+        if k in times:
+            kind = "time"
+        elif k == planned.cycle:
+            kind = "cycle"
+        else:
+            kind = "ignored" if c is None else c.channel.quantity
+        cells = table.head(k)[:ROWS] or ([f"{v:g}" for v in values[k].head(ROWS)] if k in values else [])
+        found.append(
+            {
+                "heading": heading,
+                "number": k + 1,
+                "cells": cells,
+                "kind": kind,
+                "channel": "" if c is None else c.channel.name,
+                "unit": planned.time_unit if kind == "time" else "" if c is None else c.unit.symbol,
+                "scale": 1.0 if c is None else c.rule.scale,
+            }
+        )
+    return found
+
+
+_TASKS = {"preview": preview, "settings": settings}
+
+
+def main() -> None:
+    """Do the task on standard input."""
+    task = json.load(sys.stdin)
+    try:
+        found = _TASKS[task.pop("task")](**task)
+    except InputError as e:
+        found = {"refused": str(e)}
+    sys.stdout.write(json.dumps(found, allow_nan=False))
+
+
+if __name__ == "__main__":
+    main()
