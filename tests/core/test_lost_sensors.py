@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.inputs import Input
+from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.provenance import PREDICTED, HonestError
+from thermocomp.core.terms import Variable
 from thermocomp.core.watch import Watch, Watched
 
 #: RMS 3 um, 10 um without compensation
@@ -74,3 +76,20 @@ def test_a_quarter_of_the_watched_temperatures_may_be_lost_and_no_speed_with_the
     honest = replace(KNOWN, lost={**{f"t{k}": 3.5 for k in range(9)}, "n": 3.5})
     assert _watched(7, honest) == ()
     assert _watched(9, honest) == ("t1",)
+
+
+def test_a_wrong_speed_holds_the_models_that_need_it() -> None:
+    heat = Input("t", "temperature", "degC", reference=20.0, rezero=True, low=0.0, high=10.0)
+    speed = Input("n", "spindle_speed", "1/min", reference=0.0, rezero=False, low=0.0, high=5000.0)
+    needs = Polynomial(
+        target="z_um",
+        unit="um",
+        inputs=(heat, speed),
+        variables=(Variable.single("t", 0), Variable.single("n", 1)),
+        terms=((0,), (1,)),
+        coefficients=(1.0, 0.01),
+    )
+    assert needs.wrong_speeds({"n": "off", "t": "off"}) == ["n"]
+    assert needs.wrong_speeds({"n": "missing"}) == []
+    without = replace(needs, coefficients=(1.0, 0.0))  # the speed is an input, but has no effect
+    assert without.wrong_speeds({"n": "off"}) == []

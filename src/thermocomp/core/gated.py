@@ -1,5 +1,6 @@
 """Whether the do-no-harm gate permits a model to run, and to run without some of its inputs."""
 
+from abc import abstractmethod
 from collections.abc import Collection, Mapping
 
 from thermocomp.core.exceptions import InputError
@@ -15,6 +16,11 @@ class Gated:
     inputs: tuple[Input, ...]
     honest_error: HonestError | None
     watch: Watch | None
+
+    @property
+    @abstractmethod
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the inputs that affect the deviation: see `thermocomp.core.family.ModelFamily`."""
 
     @property
     def accepted(self) -> bool:
@@ -34,14 +40,15 @@ class Gated:
         return 1 if speeds or self.watch is None else len(self.watch.names) // 4
 
     def wrong_speeds(self, failed: Mapping[str, str]) -> list[str]:
-        """Return the speeds among the inputs that were wrong before that was found: the states remember them.
+        """Return the speeds that the model needs and that were wrong before that was found: the states remember them.
 
         Parameters
         ----------
         failed : mapping of str to str
             Sensors that are not trusted, with the kind of fault.
         """
-        return [i.name for i in self.inputs if i.quantity == "spindle_speed" and failed.get(i.name) == "off"]
+        speeds = [i.name for i in self.inputs if i.quantity == "spindle_speed" and i.name in self.sensors]
+        return [name for name in speeds if failed.get(name) == "off"]
 
     def widening(self, names: Collection[str]) -> float:
         """Return the factor by which the error on unseen cycles increases without some of the inputs; at least 1."""
