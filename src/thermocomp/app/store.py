@@ -1,18 +1,19 @@
 """Files of a project as its page changes them: each version that is replaced is kept; loads no training code."""
 
 import asyncio
-import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
+from thermocomp.app.workers import Workers
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import draft, write_text
 from thermocomp.files.plaintext import read_text
@@ -21,8 +22,6 @@ from thermocomp.files.tomlfile import MOST
 NAME = "project.toml"
 #: largest file that can be dropped on the page [bytes]
 LARGEST = 1_000_000_000
-#: longest time for reading a file [s]
-PATIENCE = 120.0
 #: names of files that every system accepts
 _PLAIN = re.compile(r"[^\w .()+-]")
 _NEW = 'name = ""\n'
@@ -50,7 +49,7 @@ class Store:
             raise InputError(f"{folder}: the project's folder cannot be written: {e.strerror}") from e
         if not (folder / NAME).exists():
             write_text(_NEW, folder / NAME, overwrite=False)
-        self.editing = asyncio.Lock()
+        self.editing, self.workers = asyncio.Lock(), Workers()
         self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
         self.document()
 
@@ -80,7 +79,7 @@ class Store:
         InputError
             They are not valid.
         """
-        await ask({"task": "settings", "content": document.unwrap()})
+        await self.workers.ask({"task": "settings", "content": document.unwrap()})
         self.replace(NAME, tomlkit.dumps(document))
 
     def replace(self, name: str, text: str) -> None:
@@ -117,24 +116,48 @@ class Store:
 
     async def receive(self, name: str, parts: AsyncIterator[bytes]) -> str:
         """Write a dropped file under a free name, and return its name in the project."""
-        path, plain = self._free(name), ""
+        path, size, whole = self._free(name), 0, sha256()
         with draft(path, overwrite=False) as target:
-            size = 0
             with target.open("wb") as file:
                 async for part in parts:
                     size += len(part)
+                    whole.update(part)
                     if size > LARGEST:
                         raise InputError(f"{name}: the file has more than {LARGEST:,} bytes")
                     file.write(part)
-        plain = f"files/{path.name}"
+            if same := self._same(size, whole.digest()):
+                raise InputError(f"{name}: the project has this file already, as {same}")
         async with self.editing:
             document = self.document()
-            recordings = document.setdefault("recordings", tomlkit.aot())
             table = tomlkit.table()
-            table["file"] = plain
-            recordings.append(table)
-            await self.save(document)
-        return plain
+            table["file"] = f"files/{path.name}"
+            document.setdefault("recordings", tomlkit.aot()).append(table)
+            self.replace(NAME, tomlkit.dumps(document))
+        return f"files/{path.name}"
+
+    async def remove(self, name: str) -> None:
+        """Take a recording out of the settings; its file stays in the folder."""
+        async with self.editing:
+            document = self.document()
+            self.entry(document, name)
+            for key in ("recordings", "assess"):
+                kept = [table for table in document.get(key, ()) if table.get("file") != name]
+                document.pop(key, None)
+                if kept:
+                    tables = tomlkit.aot()
+                    for table in kept:
+                        tables.append(table)
+                    document[key] = tables
+            self.replace(NAME, tomlkit.dumps(document))
+
+    def _same(self, size: int, digest: bytes) -> str:
+        """Return the name of a recording of the project with the same content; empty if there is none."""
+        for table in self.document().get("recordings", ()):
+            path = self.folder / str(table.get("file", ""))
+            with suppress(OSError):
+                if path.stat().st_size == size and sha256(path.read_bytes()).digest() == digest:
+                    return path.name
+        return ""
 
     def _free(self, name: str) -> Path:
         """Return a path for a file: its name without signs that a system rejects, with a number if it exists."""
@@ -169,7 +192,7 @@ class Store:
         with suppress(OSError):
             known = (path.stat().st_mtime_ns, path.stat().st_size, text)
             if (found := self._read.get(name)) is None or found[0] != known:
-                asked = await ask(
+                asked = await self.workers.ask(
                     {"task": "preview", "file": str(path), "mapping": text, "guess": False, "answers": []}
                 )
                 self._read[name] = found = (known, asked)
@@ -182,14 +205,14 @@ class Store:
             table = self.entry(document := self.document(), name)
             mapping = str(table.get("mapping", ""))
             path, text = self.path(name), self._text(mapping)
-            found = await ask(
+            found = await self.workers.ask(
                 {"task": "preview", "file": str(path), "mapping": text, "guess": guess, "answers": answers}
             )
             if found["mapping"] != text:
                 self.replace(wanted := mapping or f"{name}.toml", found["mapping"])
                 if not mapping:
                     table["mapping"] = wanted
-                    await self.save(document)
+                    self.replace(NAME, tomlkit.dumps(document))
             known = (path.stat().st_mtime_ns, path.stat().st_size, found["mapping"])
             self._read[name] = (known, found)
             return found
@@ -211,40 +234,11 @@ class Store:
         return read_text(self.path(mapping), "mapping file", MOST) if mapping else ""
 
 
-async def ask(task: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the result of a task of `thermocomp.app.worker`.
-
-    Raises
-    ------
-    InputError
-        The task was refused, took too long, or ended without a result.
-    """
-    words = [sys.executable, "-m", "thermocomp.app.worker"]
-    pipe = asyncio.subprocess.PIPE
-    process = await asyncio.create_subprocess_exec(*words, stdin=pipe, stdout=pipe, stderr=pipe)
-    try:
-        out, said = await asyncio.wait_for(process.communicate(json.dumps(task).encode()), PATIENCE)
-    except TimeoutError as e:
-        raise InputError(f"reading took more than {PATIENCE:g} s; give a smaller file") from e
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-    try:
-        found: dict[str, Any] = json.loads(out)
-    except ValueError as e:
-        last = said.decode(errors="replace").strip().rpartition("\n")[2]
-        raise InputError(f"the file could not be read: {last or 'the process ended without a word'}") from e
-    if "refused" in found:
-        raise InputError(found["refused"])
-    return found
-
-
 def start_run(folder: Path, *, again: bool) -> None:
     """Start a run of a project as a process that does not end with this one."""
-    words = [sys.executable, "-m", "thermocomp", "run", str(folder), *(["--again"] if again else [])]
+    words = [sys.executable, "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
     more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {}
     nothing = subprocess.DEVNULL
     log = (folder / "run.log").open("ab")
     with log:
-        subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, **more)
+        subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=folder, **more)

@@ -65,6 +65,7 @@ def _files(store: Store) -> APIRouter:
 
     @router.get("/", response_class=HTMLResponse)
     async def show() -> HTMLResponse:
+        store.workers.warm_up()
         return HTMLResponse(template.render(folder=str(store.folder.resolve())))
 
     @router.get("/api/project")
@@ -95,6 +96,11 @@ def _files(store: Store) -> APIRouter:
     @router.post("/api/recordings/{name:path}")
     async def answer(name: str, answers: Annotated[list[dict[str, Any]], Body()]) -> Json:
         return Json({"file": name, **await store.answer(name, answers, guess=False)})
+
+    @router.delete("/api/recordings/{name:path}")
+    async def remove(name: str) -> Json:
+        await store.remove(name)
+        return Json(_state(store))
 
     @router.post("/api/undo/{name:path}")
     async def undo(name: str) -> Json:

@@ -9,7 +9,15 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from thermocomp.app.project import NAME, settings_of
 from thermocomp.core.exceptions import InputError
+from thermocomp.recordings.checks.quality import check
+from thermocomp.recordings.readers.columns import plan
+from thermocomp.recordings.readers.mapping import Mapping as ColumnMapping
+from thermocomp.recordings.readers.mending import Draft, located, mend, take_best, to_toml
+from thermocomp.recordings.readers.opening import open_table
+from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.report import checks
 
 #: first rows and columns shown, and points of a curve
 ROWS, COLUMNS, POINTS = 8, 200, 3000
@@ -35,11 +43,6 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
         ``mapping`` is the new TOML. Of a file that cannot be read there are ``error`` and ``options``, the possible
         entries of the mapping.
     """
-    from thermocomp.recordings.checks.quality import check
-    from thermocomp.recordings.readers.mending import Draft, located, mend, take_best, to_toml
-    from thermocomp.recordings.readers.opening import open_table
-    from thermocomp.report import checks
-
     draft = Draft(mapping)
     for answer in answers:
         draft.add(answer)
@@ -81,8 +84,6 @@ def settings(content: Mapping[str, Any]) -> dict[str, Any]:
     InputError
         They are not.
     """
-    from thermocomp.app.project import NAME, settings_of
-
     settings_of(content, NAME)
     return {}
 
@@ -91,10 +92,8 @@ def _option(remedy: Mapping[str, Any], text: str) -> dict[str, Any]:
     return {"remedy": remedy, "toml": text}
 
 
-def _columns(table: Any, mapping: Any) -> list[dict[str, Any]]:
+def _columns(table: FileTable, mapping: ColumnMapping) -> list[dict[str, Any]]:
     """Return the first columns of a file: heading, first cells, and how they are understood."""
-    from thermocomp.recordings.readers.columns import plan
-
     planned = plan(table, mapping)
     channels = {c.index: c for c in planned.columns}
     times = {planned.times.time, planned.times.date, *planned.beside}
@@ -129,9 +128,12 @@ _TASKS = {"preview": preview, "settings": settings}
 
 def main() -> None:
     """Do the task on standard input."""
-    task = json.load(sys.stdin)
+    task = sys.stdin.read()
+    if not task:  # the server has ended
+        return
+    given = json.loads(task)
     try:
-        found = _TASKS[task.pop("task")](**task)
+        found = _TASKS[given.pop("task")](**given)
     except InputError as e:
         found = {"refused": str(e)}
     sys.stdout.write(json.dumps(found, allow_nan=False))

@@ -1,8 +1,9 @@
 """Summary of an exported compensator: verdict, contents and origin."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from thermocomp.core.model import ErrorModel
 from thermocomp.runtime.compensator import Compensator
 
 
@@ -60,10 +61,18 @@ def _verdict(compensator: Compensator) -> str:
     shadow, lines = compensator.shadow, compensator.lines
     if len(shadow) == len(lines):
         return f"SHADOW ONLY, {', '.join(lines)}: not proven on unseen cycles; all corrections stay zero"
-    said = {"accepted on unseen cycles": list[str](), "UNPROVEN, approved nevertheless": list[str]()}
+    said = dict[str, list[str]]()
     for target, line in lines.items():
         if target not in shadow:
-            taken = any(m.honest_error and m.honest_error.taken for m in compensator.models[line.models])
-            said["UNPROVEN, approved nevertheless" if taken else "accepted on unseen cycles"].append(target)
-    words = [f"{', '.join(targets)}: {word}" for word, targets in said.items() if targets]
+            said.setdefault(tell_verdict(compensator.models[line.models]), []).append(target)
+    words = [f"{', '.join(targets)}: {word}" for word, targets in said.items()]
     return "; ".join([*words, *([f"SHADOW ONLY, {', '.join(shadow)}: corrections stay zero"] if shadow else [])])
+
+
+def tell_verdict(models: Sequence[ErrorModel]) -> str:
+    """Return the verdict on models that run together, in words: that of the least certain one."""
+    found = [m.honest_error for m in models if m.honest_error is not None]
+    if any(h.taken for h in found):
+        return "UNPROVEN, approved nevertheless"
+    limited = any(h.word == "accepted for this duty" for h in found)
+    return f"accepted on unseen cycles{', FOR THE DUTY OF ITS TRAINING ONLY' if limited else ''}"

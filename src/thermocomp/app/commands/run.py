@@ -51,8 +51,7 @@ def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
         print_json({"folder": str(folder.path), **folder.read()})
     models = explain_all(modelfile.read(folder.path / "model.json")).models
     if not json:
-        written = [folder.path / name for step in folder.read()["steps"] for name in step[2]]
-        print_answer(answer_models(models, _following(project, folder), written), console, hint=False)
+        print_answer(answer_models(models, _following(project, folder), [folder.path]), console, hint=False)
     return 0 if any(e.word.startswith("accepted") for e in models) else 1
 
 

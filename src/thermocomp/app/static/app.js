@@ -39,6 +39,8 @@ const answer = quietly(async (name, remedies) => {
   draw(name);
 });
 
+const removeFile = quietly(async name => { delete seen[name]; render(await api(place(name), "DELETE")); });
+
 const undo = quietly(async name => { seen[name] = await api("api/undo/" + name.split("/").map(encodeURIComponent).join("/"), "POST"); draw(name); });
 
 function choices(name, options) {
@@ -47,7 +49,8 @@ function choices(name, options) {
 
 function draw(name) {  // the card of a recording
   const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
-  card.replaceChildren(element("h2", name.replace(/^files\//, "")));
+  const remove = button("Remove", () => removeFile(name)); remove.title = "The file stays in the project's folder.";
+  card.replaceChildren(element("h2", name.replace(/^files\//, "") + " ", "", remove));
   if (!found) { card.append(element("p", "reading ...", "quiet")); return; }
   const undoing = found.mapping ? button("Undo the last change", () => undo(name)) : "";
   if (found.error) {
@@ -145,13 +148,13 @@ function progress(run) {
   box.replaceChildren(element("p", `Run ${run.number}: ${run.step || "reading"}${run.total ? `, ${run.done} of ${run.total} tasks${left}` : ""}. ${run.task}`), bar);
 }
 
-const number = v => v == null ? "–" : v.toFixed(2);
+const um = v => v == null ? "–" : v.toFixed(2);
 const verdict = quietly(async run => {
   if (!run || run.state !== "done" || shownRun === run.number + run.ended) return;
   shownRun = run.number + run.ended;
   const found = (await api(`api/runs/${run.number}`)).results, rows = (found.compare || {}).recommended || [], models = (found.fit || {}).models || [];
   const head = ["deviation", "method", "verdict", "RMS with compensation [um]", "RMS without [um]", "why"];
-  const line = r => { const m = models.find(o => o.target === r.target) || {}; return [r.target, r.model || r.written || "none", m.verdict || r.verdict, number(m.rms_um ?? m.rms), number(m.none_rms_um ?? m.none_rms), m.reason || r.reason]; };
+  const line = r => { const m = models.find(o => o.target === r.target) || {}; return [r.target, r.model || r.written || "none", m.verdict || r.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason || r.reason]; };
   const body = rows.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
   $("verdict").replaceChildren(element("h2", `Result of run ${run.number}, on unseen data`),
     element("div", "", "scroll", element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),

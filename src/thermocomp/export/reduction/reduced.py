@@ -10,7 +10,7 @@ from typing import NamedTuple
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
-from thermocomp.export.facts import Facts
+from thermocomp.export.facts import Facts, tell_verdict
 
 #: largest number of eight digits
 _LARGEST = Decimal(99_999_999)
@@ -258,7 +258,7 @@ def head(reductions: Sequence[Reduced], facts: Facts, sign: str, units: str) -> 
     for r in reductions:
         found = r.model.honest_error
         taken = found.taken if found is not None else ""
-        words.append(f"{r.model.target}: {'UNPROVEN, approved nevertheless' if taken else 'accepted on unseen cycles'}")
+        words.append(f"{r.model.target}: {tell_verdict([r.model])}")
         more += [f"{r.model.target}: unproven, approved by {taken}"] if taken else []
         more += [f"{r.model.target}: {r.loss_in_words}; {r.none.rms:.2f} um without compensation"]
     kind = (

@@ -1,0 +1,206 @@
+"""A project is run: the same files as by the single commands, nothing twice, nothing lost."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from projects import QUICK, small_project
+
+import thermocomp as tc
+from thermocomp.api.keywords import silent
+from thermocomp.app import running
+from thermocomp.app.project import Project
+from thermocomp.app.runfolder import SILENT, RunFolder, runs_of
+from thermocomp.app.running import Run, run_project
+from thermocomp.cli.app import run as command
+from thermocomp.core.exceptions import InputError
+
+
+def steps(folder: RunFolder) -> list[str]:
+    return [step[0] for step in folder.read()["steps"]]
+
+
+def rerun(folder: Path, *, again: bool = False) -> RunFolder:
+    return run_project(Project(folder), silent, again=again).folder
+
+
+def change(folder: Path, before: str, after: str) -> None:
+    file = folder / "project.toml"
+    text = file.read_text(encoding="utf-8")
+    assert before in text
+    file.write_text(text.replace(before, after), encoding="utf-8")
+
+
+def test_the_model_is_that_of_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = small_project(tmp_path / "project")
+    assert command(["run", str(folder)]) == 1  # robustness = false accepts nothing
+    assert f"Written: {folder / 'runs' / '1'}" in capsys.readouterr().out
+    fitted = tc.fit(folder / "files" / "drift.csv", "z_um", "ols", jobs=1)
+    compared = tc.compare(folder / "files" / "drift.csv", "z_um", ["ols"], robustness=False, jobs=1)
+    compared.fit().save(tmp_path / "compared.json")
+    assert (folder / "runs" / "1" / "model.json").read_bytes() == (tmp_path / "compared.json").read_bytes()
+    change(folder, "robustness = false\n", "")
+    second = rerun(folder)
+    fitted.save(tmp_path / "fitted.json")
+    assert (second.path / "model.json").read_bytes() == (tmp_path / "fitted.json").read_bytes()
+    assert {"check.html", "comparison.html", "compare.json", "fit.json", "project.toml"} <= {
+        p.name for p in second.path.iterdir()
+    }
+
+
+def test_what_has_not_changed_is_not_done_again(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    first = rerun(folder)
+    written = (first.path / "model.json").stat().st_mtime_ns
+    assert rerun(folder).number == 1
+    change(folder, "Small machine", "Another name")
+    assert rerun(folder).number == 1
+    assert (first.path / "model.json").stat().st_mtime_ns == written
+    assert rerun(folder, again=True).number == 2
+    change(folder, '["ols"]', '["ridge"]')
+    assert rerun(folder).number == 3
+    drift = folder / "files" / "drift.csv"
+    drift.write_text("\n".join(drift.read_text(encoding="utf-8").splitlines()[:-3]) + "\n", encoding="utf-8")
+    assert rerun(folder).number == 4
+    assert [r.number for r in runs_of(folder)] == [1, 2, 3, 4]
+    assert 'models = ["ridge"]' in (folder / "runs" / "3" / "project.toml").read_text(encoding="utf-8")
+
+
+def test_an_export_is_added_to_its_run(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    rerun(folder)
+    for to, names in (("c99", ["export-c99"]), ("st", ["export-c99", "export-st"])):
+        if to == "c99":
+            (folder / "project.toml").write_text(QUICK + '\n[export]\nto = "c99"\n', encoding="utf-8")
+        else:
+            change(folder, '"c99"', '"st"')
+        found = rerun(folder)
+        assert found.number == 1
+        assert sorted(p.name for p in found.path.iterdir() if p.is_dir()) == names
+    assert steps(found) == ["check", "compare", "fit", "export", "export"]
+    change(folder, 'to = "st"', 'to = "st"\nname = "mill"')
+    assert (rerun(folder).path / "export-st-2" / "tc_mill.st").exists()
+
+
+def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = small_project(tmp_path / "project", QUICK + '\n[export]\nto = "c99"\n')
+
+    def stop(_: Run) -> tuple[list[str], str]:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Run, "_export", stop)
+        with pytest.raises(KeyboardInterrupt):
+            rerun(folder)
+    (run,) = runs_of(folder)
+    assert (run.read()["state"], steps(run)) == ("stopped", ["check", "compare", "fit"])
+    monkeypatch.setattr(running, "compare", lambda *_, **__: pytest.fail("it was compared again"))
+    assert rerun(folder).number == 1
+    assert (run.read()["state"], steps(run)) == ("done", ["check", "compare", "fit", "export"])
+
+
+def test_what_fails_says_why_and_stays(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project", QUICK.replace("z_um", "nothing_um"))
+    with pytest.raises(InputError, match="nothing_um"):
+        rerun(folder)
+    (run,) = runs_of(folder)
+    assert run.read()["state"] == "failed"
+    assert "nothing_um" in run.read()["error"]
+    change(folder, "nothing_um", "z_um")
+    assert rerun(folder).number == 2
+
+
+def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    run = rerun(folder)
+    state = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
+    state |= {"state": "running", "seen": time.time(), "steps": state["steps"][:1]}
+    (run.path / "run.json").write_text(json.dumps(state), encoding="utf-8")
+    with pytest.raises(InputError, match="going on in another process"):
+        rerun(folder)
+    state["seen"] -= SILENT + 1.0
+    (run.path / "run.json").write_text(json.dumps(state), encoding="utf-8")
+    assert run.read()["state"] == "stopped"
+    assert "without a word" in run.read()["error"]
+    assert steps(rerun(folder)) == ["check", "compare", "fit"]
+    (run.path / "run.json").unlink()  # killed before its first state
+    assert run.read()["state"] == "stopped"
+    assert rerun(folder).number == 2
+
+
+def test_a_run_obeys(tmp_path: Path) -> None:
+    """A run in a process of its own, asked to stop by a file, as the page does."""
+    folder = small_project(tmp_path / "project", QUICK.replace("robustness = false\n", "").replace('"ols"', '"mlp"'))
+    words = [sys.executable, "-m", "thermocomp", "run", str(folder)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        try:
+            until = time.monotonic() + 120.0
+            while not ((found := runs_of(folder)) and found[0].read()["step"] == "compare"):
+                assert time.monotonic() < until, "it never began to compare"
+                assert process.poll() is None
+                time.sleep(0.05)
+            found[0].ask_to_stop()
+            assert process.wait(60.0) == 130
+        finally:
+            process.kill()
+    state = found[0].read()
+    assert (state["state"], [s[0] for s in state["steps"]]) == ("stopped", ["check"])
+    assert not (found[0].path / "stop").exists()
+
+
+def test_other_recordings_are_assessed(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project", QUICK + '\n[[assess]]\nfile = "files/drift.csv"\n')
+    run = rerun(folder)
+    assert steps(run)[-1] == "assess"
+    assert (run.path / "assessment.html").exists()
+
+
+def test_two_loggers_are_joined(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project", QUICK + "\n[join]\noffset = [0.0]\n")
+    table = tc.read(folder / "files" / "drift.csv").to_frame()
+    probes = [c for c in table.columns if c.endswith("_um")]
+    table.drop(columns=probes).to_csv(folder / "files" / "drift.csv", index=False)
+    table[["time_s", *probes]].to_csv(folder / "files" / "probes.csv", index=False)
+    change(folder, "\n[compare]", '\n[[recordings]]\nfile = "files/probes.csv"\n\n[compare]')
+    run = rerun(folder)
+    assert steps(run)[0] == "join"
+    assert (run.path / "joined.parquet").exists()
+    assert tc.compare(run.path / "joined.parquet", "z_um", ["ols"], robustness=False, jobs=1).best
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "says"),
+    [
+        ('models = ["ols"]', 'model = ["ols"]', r"compare\.model: this key does not exist"),
+        ('models = ["ols"]', 'targets_ = "z"', r"compare\.targets_: this key does not exist"),
+        ("jobs = 1", 'jobs = "1"', r"compare\.jobs = '1'"),
+        ("jobs = 1", 'leave_one = "week"', r"compare\.leave_one = 'week'"),
+        ('file = "files/drift.csv"', 'mapping = "x.toml"', r"recordings\.0\.file: this key is missing"),
+        ('file = "files/drift.csv"', 'file = "../drift.csv"', "not in the project's folder"),
+        ('file = "files/drift.csv"', 'file = "files/other.csv"', r"other\.csv: the file cannot be read"),
+        ('[[recordings]]\nfile = "files/drift.csv"', "", r"names no recording: add a table \[\[recordings\]\]"),
+        ("[compare]", "[export]\n[compare]", r"export\.to: this key is missing"),
+        ("[compare]", "[compare", "not valid TOML"),
+    ],
+)
+def test_settings_that_cannot_be_used(
+    tmp_path: Path, before: str, after: str, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = small_project(tmp_path / "project")
+    change(folder, before, after)
+    with pytest.raises(InputError, match=says):
+        rerun(folder)
+    assert command(["run", str(folder / "project.toml")]) == 2
+    assert "project.toml" in capsys.readouterr().err
+
+
+def test_json_has_the_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = small_project(tmp_path / "project")
+    assert command(["run", str(folder), "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["folder"] == str(folder / "runs" / "1")
+    assert said["state"] == "done"
+    assert [s[0] for s in said["steps"]] == ["check", "compare", "fit"]
