@@ -12,14 +12,13 @@ from pydantic import TypeAdapter, ValidationError
 
 from thermocomp import __version__
 from thermocomp.api.verbs import compare
+from thermocomp.app.store import NAME, find_inside
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.export.reduction.options import ReductionOptions
 from thermocomp.files.plaintext import find_keys, list_errors, strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 
-#: name of the settings file of a project
-NAME = "project.toml"
 #: parameters of `compare` that a project gives elsewhere
 _ELSEWHERE = ("recordings", "mapping", "starts", "limits", "scheduler", "progress")
 
@@ -190,10 +189,10 @@ class Project:
         InputError
             The file is not in the project's folder: a project that is copied must stay whole.
         """
-        found = self.folder / name
-        if not found.resolve().is_relative_to(self.folder.resolve()):
-            raise InputError(f"{self.file}: {name}: the file is not in the project's folder; copy it there")
-        return found
+        try:
+            return find_inside(self.folder, name)
+        except InputError as e:
+            raise InputError(f"{self.file}: {e}") from e
 
     def key_of(self, tables: Sequence[str], recordings: Sequence[ProjectRecording]) -> str:
         """Return the SHA-256 of what determines a result: version, tables of the settings, recordings, mappings."""

@@ -11,8 +11,9 @@ from thermocomp.api.inputs import read
 from thermocomp.api.join import join
 from thermocomp.api.results import Compared, FittedModels
 from thermocomp.api.verbs import assess, compare
-from thermocomp.app.project import NAME, Project, ProjectRecording, given
+from thermocomp.app.project import Project, ProjectRecording, given
 from thermocomp.app.runfolder import RunFolder, Step, new_run, runs_of
+from thermocomp.app.store import NAME
 from thermocomp.cli.answers import free
 from thermocomp.cli.jsonoutput import as_text
 from thermocomp.core.exceptions import InputError

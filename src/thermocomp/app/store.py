@@ -5,10 +5,10 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import suppress
 from hashlib import sha256
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import tomlkit
@@ -163,6 +163,8 @@ class Store:
         """Return a path for a file: its name without signs that a system rejects, with a number if it exists."""
         stem, suffix = Path(name.replace("\\", "/")).stem, Path(name).suffix
         plain = _PLAIN.sub("_", stem).strip(" .")[:80] or "recording"
+        if PureWindowsPath(plain).is_reserved():
+            plain = f"_{plain}"
         end, number = _PLAIN.sub("", suffix)[:12].lower(), 1
         path = self.folder / "files" / f"{plain}{end}"
         while path.exists():
@@ -187,7 +189,7 @@ class Store:
     async def preview(self, name: str) -> dict[str, Any]:
         """Return what a recording contains, see `thermocomp.app.worker.preview`; read again only if it has changed."""
         table = self.entry(self.document(), name)
-        path, mapping = self.path(name), str(table.get("mapping", ""))
+        path, mapping = find_inside(self.folder, name), str(table.get("mapping", ""))
         text = self._text(mapping)
         with suppress(OSError):
             known = (path.stat().st_mtime_ns, path.stat().st_size, text)
@@ -199,14 +201,14 @@ class Store:
             return found[1]
         raise InputError(f"{name}: the file cannot be read")
 
-    async def answer(self, name: str, answers: list[Mapping[str, Any]], *, guess: bool) -> dict[str, Any]:
+    async def answer(self, name: str, answers: Sequence[Mapping[str, Any]], *, guess: bool) -> dict[str, Any]:
         """Add entries to the mapping of a recording, and return its preview."""
         async with self.editing:
             table = self.entry(document := self.document(), name)
             mapping = str(table.get("mapping", ""))
-            path, text = self.path(name), self._text(mapping)
+            path, text = find_inside(self.folder, name), self._text(mapping)
             found = await self.workers.ask(
-                {"task": "preview", "file": str(path), "mapping": text, "guess": guess, "answers": answers}
+                {"task": "preview", "file": str(path), "mapping": text, "guess": guess, "answers": [*answers]}
             )
             if found["mapping"] != text:
                 self.replace(wanted := mapping or f"{name}.toml", found["mapping"])
@@ -217,21 +219,25 @@ class Store:
             self._read[name] = (known, found)
             return found
 
-    def path(self, name: str) -> Path:
-        """Return the path of a file of the project.
-
-        Raises
-        ------
-        InputError
-            The file is elsewhere.
-        """
-        path = self.folder / name
-        if not path.resolve().is_relative_to(self.folder.resolve()):
-            raise InputError(f"{name}: the file is not in the project's folder")
-        return path
-
     def _text(self, mapping: str) -> str:
-        return read_text(self.path(mapping), "mapping file", MOST) if mapping else ""
+        return read_text(find_inside(self.folder, mapping), "mapping file", MOST) if mapping else ""
+
+
+def find_inside(folder: Path, name: str) -> Path:
+    """Return the path of a file in a folder.
+
+    Raises
+    ------
+    InputError
+        The name, or a link, leads elsewhere.
+    """
+    try:
+        path = folder / name
+        if path.resolve().is_relative_to(folder.resolve()):
+            return path
+    except ValueError:  # a null character
+        pass
+    raise InputError(f"{name!r}: the file is not in the project's folder; copy it there")
 
 
 def start_run(folder: Path, *, again: bool) -> None:

@@ -18,11 +18,13 @@ from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
 from thermocomp.app.runfolder import RunFolder, runs_of
-from thermocomp.app.store import LARGEST, Store, start_run
+from thermocomp.app.store import LARGEST, Store, find_inside, start_run
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.page.doors import Door, Json
 
 _HERE = Path(__file__).parent
+#: largest settings, and answers to questions about a file [bytes]
+SETTINGS = 1_000_000
 #: time between two looks at the runs, for the event stream [s]
 OFTEN = 0.5
 #: pages of results have their own scripts; they must not reach the page of the project
@@ -41,7 +43,7 @@ def make_app(store: Store, token: str = "") -> FastAPI:
     token = token or secrets.token_urlsafe(24)
     app = FastAPI(title="thermocomp app", docs_url=None, redoc_url=None, default_response_class=Json)
     app.state.token = token
-    app.add_middleware(Door, most=LARGEST)
+    app.add_middleware(Door, most=_largest)
     static = StaticFiles(directory=_HERE / "static", packages=[("thermocomp.report", "static")])
     app.mount(f"/{token}/static", static)
     app.include_router(_files(store), prefix=f"/{token}")
@@ -56,6 +58,11 @@ def make_app(store: Store, token: str = "") -> FastAPI:
         return Json({"detail": str(error)}, 422)
 
     return app
+
+
+def _largest(request: Request) -> int:
+    """Return the maximum size of a request: files go to the disk, everything else into memory."""
+    return LARGEST if request.method == "PUT" and "/api/drop/" in request.url.path else SETTINGS
 
 
 def _files(store: Store) -> APIRouter:
@@ -135,8 +142,8 @@ def _results(store: Store) -> APIRouter:
 
     @router.get("/runs/{number}/{name:path}")
     async def file(number: Annotated[int, InPath(ge=1, le=10**9)], name: str) -> FileResponse:
-        path = (_run(store, number).path / name).resolve()
-        if not path.is_relative_to((store.folder / "runs" / str(number)).resolve()) or not path.is_file():
+        folder = _run(store, number).path
+        if not name or not (path := find_inside(folder, name)).is_file():
             raise HTTPException(404, f"run {number} has no file {name}")
         kind = mimetypes.guess_type(path.name)[0] or "text/plain"
         return FileResponse(path, media_type=kind, headers=_ALONE)

@@ -6,10 +6,11 @@ alone, and the training code is never loaded by the server.
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from thermocomp.app.project import NAME, settings_of
+from thermocomp.app.project import settings_of
+from thermocomp.app.store import NAME
 from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.readers.columns import plan
@@ -123,7 +124,7 @@ def _columns(table: FileTable, mapping: ColumnMapping) -> list[dict[str, Any]]:
     return found
 
 
-_TASKS = {"preview": preview, "settings": settings}
+_TASKS: dict[str, Callable[..., dict[str, Any]]] = {"preview": preview, "settings": settings}
 
 
 def main() -> None:

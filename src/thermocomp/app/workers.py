@@ -27,6 +27,13 @@ class Workers:
         if self._ahead is None:
             self._ahead = asyncio.create_task(_start())
 
+    async def close(self) -> None:
+        """End the process that is ahead."""
+        if self._ahead is not None:
+            process, self._ahead = await self._ahead, None
+            process.kill()
+            await process.communicate()
+
     async def ask(self, task: Mapping[str, Any]) -> dict[str, Any]:
         """Return the result of a task.
 

@@ -152,10 +152,11 @@ const um = v => v == null ? "–" : v.toFixed(2);
 const verdict = quietly(async run => {
   if (!run || run.state !== "done" || shownRun === run.number + run.ended) return;
   shownRun = run.number + run.ended;
-  const found = (await api(`api/runs/${run.number}`)).results, rows = (found.compare || {}).recommended || [], models = (found.fit || {}).models || [];
+  const { compare, fit } = (await api(`api/runs/${run.number}`)).results, models = (fit || {}).models || [];
   const head = ["deviation", "method", "verdict", "RMS with compensation [um]", "RMS without [um]", "why"];
-  const line = r => { const m = models.find(o => o.target === r.target) || {}; return [r.target, r.model || r.written || "none", m.verdict || r.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason || r.reason]; };
-  const body = rows.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
+  const method = target => [...((compare || {}).recommended || []).map(r => ({ ...r, model: r.written })), ...((compare || {}).results || [])].find(r => r.target === target && r.model);
+  const line = m => [m.target, (method(m.target) || { model: m.family }).model, m.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason];
+  const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
   $("verdict").replaceChildren(element("h2", `Result of run ${run.number}, on unseen data`),
     element("div", "", "scroll", element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
     element("p", "", "", link(run, "comparison.html", "All methods, with curves and reasons"), " · ", link(run, "check.html", "Check of the data"), " · ", link(run, "model.json", "Model file")));

@@ -7,7 +7,7 @@ import re
 import socket
 import time
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Any
 
@@ -97,11 +97,13 @@ class Door:
     ----------
     names : collection of str
         Host names of the page, in addition to ``localhost`` and the addresses of this computer.
-    most : int
-        Maximum size of a request [bytes].
+    most : callable
+        Function that returns the maximum size of a request [bytes].
     """
 
-    def __init__(self, app: ASGIApp, names: Collection[str] = (), most: int = MOST_BYTES) -> None:
+    def __init__(
+        self, app: ASGIApp, names: Collection[str] = (), most: Callable[[Request], int] = lambda _: MOST_BYTES
+    ) -> None:
         self._app, self._most = app, most
         self._names = {"localhost", *map(_as_browsers_write, names)}
 
@@ -128,11 +130,11 @@ class Door:
         shows = request.method in ("GET", "HEAD") and not request.url.path.startswith("/api/")
         if not shows and (why := explain_foreign(request)):
             return 403, why
-        length = headers.get("content-length", "0")
-        if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > self._most:
-            return 413, f"a request has at most {self._most} bytes"
+        length, most = headers.get("content-length", "0"), self._most(request)
+        if not (length.isascii() and length.isdigit() and len(length) < 20) or int(length) > most:
+            return 413, f"a request has at most {most} bytes"
         if "transfer-encoding" in headers:
-            return 413, f"a request has at most {self._most} bytes, and states its length (Content-Length)"
+            return 413, f"a request has at most {most} bytes, and states its length (Content-Length)"
         return None
 
 
