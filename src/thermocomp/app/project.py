@@ -1,7 +1,7 @@
 """Projects: a folder with ``project.toml``, its recordings and mappings, and the results of each run."""
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cache
 from hashlib import sha256
@@ -94,7 +94,7 @@ CompareOptions: Any = _compare_options()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class ProjectSettings:
     """Content of ``project.toml``.
 
     Parameters
@@ -124,11 +124,11 @@ class Settings:
 
 
 @cache
-def _adapter() -> TypeAdapter[Settings]:
+def _adapter() -> TypeAdapter[ProjectSettings]:
     return strict_adapter(Settings)
 
 
-def settings_of(content: Mapping[str, Any], source: str | Path) -> Settings:
+def settings_of(content: Mapping[str, Any], source: str | Path) -> ProjectSettings:
     """Return validated settings.
 
     Parameters
@@ -216,7 +216,3 @@ def given(options: Any, leave: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the values of a table as keywords, without some and without empty texts."""
     values = {f.name: getattr(options, f.name) for f in fields(options) if f.name not in leave}
     return {name: value for name, value in values.items() if value != ""}
-
-
-#: called with a line of text after each task
-Progress = Callable[..., object]

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import write_text
@@ -21,14 +21,25 @@ BEAT, SILENT = 2.0, 15.0
 _STOP = "stop"
 
 
-class Step(NamedTuple):
-    """A finished step of a run."""
+@dataclass(frozen=True, kw_only=True)
+class RunStep:
+    """A finished step of a run.
+
+    Parameters
+    ----------
+    files : list of str
+        Files written, relative to the folder of the run.
+    text : str
+        The result in a sentence or two.
+    key : str
+        Key of the settings that only this step depends on.
+    """
 
     name: str
     seconds: float
-    files: list[str]  #: relative to the folder of the run
-    text: str  #: the result in a sentence or two
-    key: str = ""  #: of the settings that only this step depends on
+    files: list[str]
+    text: str
+    key: str = ""
 
 
 @dataclass
@@ -58,7 +69,7 @@ class RunState:
     done: int = 0
     total: int = 0
     step_began: float = 0.0
-    steps: list[Step] = field(default_factory=list)
+    steps: list[RunStep] = field(default_factory=list)
     error: str = ""
 
 
@@ -90,7 +101,7 @@ class RunFolder:
     def take_up(self) -> None:
         """Continue with the state of an earlier process: finished steps are kept."""
         found = self.read()
-        steps = [Step(*s) for s in found["steps"]]
+        steps = [RunStep(**s) for s in found["steps"]]
         self.state = RunState(
             fingerprint=found["fingerprint"], version=found["version"], began=found["began"], steps=steps
         )

@@ -12,7 +12,7 @@ from thermocomp.api.join import join
 from thermocomp.api.results import Compared, FittedModels
 from thermocomp.api.verbs import assess, compare
 from thermocomp.app.project import Project, ProjectRecording, given
-from thermocomp.app.runfolder import RunFolder, Step, new_run, runs_of
+from thermocomp.app.runfolder import RunFolder, RunStep, new_run, runs_of
 from thermocomp.app.store import NAME
 from thermocomp.cli.answers import free
 from thermocomp.cli.jsonoutput import as_text
@@ -26,7 +26,7 @@ from thermocomp.recordings.recording import Recording
 OFTEN = 0.5
 
 
-class Progress:
+class RunProgress:
     """Progress of a verb, in the state of a run.
 
     Parameters
@@ -59,7 +59,7 @@ class Progress:
             self._next = time.monotonic() + OFTEN
 
 
-def run_project(project: Project, tell: Callable[..., object], *, again: bool = False) -> "Run":
+def run_project(project: Project, tell: Callable[..., object], *, again: bool = False) -> "ProjectRun":
     """Run a project: continue its last run if nothing has changed since, else in a new folder.
 
     Parameters
@@ -92,12 +92,12 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
             raise InputError(f"{folder.path}: this run is going on in another process; stop that one first")
         folder.take_up()
     write_text(project.file.read_text(encoding="utf-8"), folder.path / NAME, overwrite=True)
-    run = Run(project, folder, tell)
+    run = ProjectRun(project, folder, tell)
     run.work()
     return run
 
 
-class Run:
+class ProjectRun:
     """A run of a project.
 
     Parameters
@@ -193,8 +193,8 @@ class Run:
     def _model(self) -> Path:
         return self.folder.path / "model.json"
 
-    def _progress(self) -> Progress:
-        return Progress(self.folder, self.tell)
+    def _progress(self) -> RunProgress:
+        return RunProgress(self.folder, self.tell)
 
     def _write(self, found: Any, *written: tuple[Callable[..., object], str]) -> tuple[list[str], str]:
         """Write the files of a result, and its JSON; return their names and the result as text."""
@@ -218,6 +218,7 @@ class Run:
         state.step, state.step_began, state.task, state.done, state.total = name, began, "", 0, 0
         self.folder.save()
         files, text = work()
-        state.steps.append(Step(name, round(time.time() - began, 1), files, text, key))
+        seconds = round(time.time() - began, 1)
+        state.steps.append(RunStep(name=name, seconds=seconds, files=files, text=text, key=key))
         state.step = state.task = ""
         self.folder.save()

@@ -1,7 +1,8 @@
 """`thermocomp run`: a project from its recordings to the code for a controller, without questions."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thermocomp.cli.answers import free, print_answer
 from thermocomp.cli.exits import STOPPED
@@ -9,7 +10,7 @@ from thermocomp.cli.explain import answer_models
 from thermocomp.cli.jsonoutput import print_json
 from thermocomp.cli.progress import show_progress
 from thermocomp.cli.reading import print_trouble
-from thermocomp.cli.terminal import console
+from thermocomp.cli.terminal import console, words
 
 if TYPE_CHECKING:
     from thermocomp.app.runfolder import RunFolder
@@ -45,19 +46,23 @@ def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
         with show_progress(hidden=json, warn=print_trouble) as progress:
             folder = run_project(opened, progress, again=again).folder
     except KeyboardInterrupt:
-        console.print(f"stopped; to continue: thermocomp run {project}", markup=False, soft_wrap=True)
+        console.print(words(f"stopped; to continue: thermocomp run {project}"), soft_wrap=True)
         return STOPPED
     if json:
-        print_json({"folder": str(folder.path), **folder.read()})
+        print_json({"folder": str(folder.path), "steps": [_told(step) for step in folder.read()["steps"]]})
     models = explain_all(modelfile.read(folder.path / "model.json")).models
     if not json:
         print_answer(answer_models(models, _following(project, folder), [folder.path]), console, hint=False)
     return 0 if any(e.word.startswith("accepted") for e in models) else 1
 
 
+def _told(step: Mapping[str, Any]) -> dict[str, Any]:
+    return {"step": step["name"], "seconds": step["seconds"], "files": step["files"], "result": step["text"]}
+
+
 def _following(project: Path, folder: "RunFolder") -> tuple[str, ...]:
     """Return the command that follows: export, unless the project does it."""
-    exported = any(step[0] == "export" for step in folder.read()["steps"])
+    exported = any(step["name"] == "export" for step in folder.read()["steps"])
     model = str(folder.path / "model.json")
     return (
         ("thermocomp", "app", str(project))

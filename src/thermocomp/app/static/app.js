@@ -166,7 +166,7 @@ function link(run, name, text) { const a = element("a", text); a.href = `runs/${
 
 function runsTable(runs) {
   $("runs").tBodies[0].replaceChildren(...[...runs].reverse().map(r => {
-    const files = r.steps.flatMap(s => s[2]).filter(f => f.endsWith(".html")), said = r.steps.filter(s => s[0] === "compare").map(s => s[3]).join(" ");
+    const files = r.steps.flatMap(s => s.files).filter(f => f.endsWith(".html")), said = r.steps.filter(s => s.name === "compare").map(s => s.text).join(" ");
     return element("tr", "", "", element("td", String(r.number)), element("td", r.state, r.state), element("td", r.began.replace("T", " ").slice(0, 16)), element("td", r.error || said), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
   }));
   $("command").textContent = state.command;
@@ -176,8 +176,8 @@ function runsTable(runs) {
 
 function deployForm(run) {
   if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
-  const steps = run.steps.filter(s => s[0] === "export");
-  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s[2].length ? s[2][0].split("/")[0] : "nothing exported"), element("p", s[3]), element("ul", "", "", ...s[2].map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
+  const steps = run.steps.filter(s => s.name === "export");
+  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s.files.length ? s.files[0].split("/")[0] : "nothing exported"), element("p", s.text), element("ul", "", "", ...s.files.map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
   if (!steps.length) $("package").append(element("p", "Nothing is exported yet.", "quiet"));
 }
 
