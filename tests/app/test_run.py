@@ -88,7 +88,7 @@ def test_an_export_is_added_to_its_run(tmp_path: Path) -> None:
 def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = small_project(tmp_path / "project", QUICK + '\n[export]\nto = "c99"\n')
 
-    def stop(_: Run) -> tuple[list[str], str]:
+    def stop(_: ProjectRun) -> tuple[list[str], str]:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:

@@ -125,7 +125,7 @@ class ProjectSettings:
 
 @cache
 def _adapter() -> TypeAdapter[ProjectSettings]:
-    return strict_adapter(Settings)
+    return strict_adapter(ProjectSettings)
 
 
 def settings_of(content: Mapping[str, Any], source: str | Path) -> ProjectSettings:

@@ -66,13 +66,13 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
     ----------
     project : Project
     tell : callable
-        Receives the progress; see `Progress`.
+        Receives the progress; see `RunProgress`.
     again : bool
         Start a new run in any case.
 
     Returns
     -------
-    Run
+    ProjectRun
         Finished; one that was finished before is returned as it is.
 
     Raises
@@ -105,7 +105,7 @@ class ProjectRun:
     project : Project
     folder : RunFolder
     tell : callable
-        Receives the progress; see `Progress`.
+        Receives the progress; see `RunProgress`.
     """
 
     def __init__(self, project: Project, folder: RunFolder, tell: Callable[..., object]) -> None:
