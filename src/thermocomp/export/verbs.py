@@ -56,7 +56,17 @@ class ExportedCode:
     @property
     def verdict(self) -> str:
         """Verdict on the model: first line of the page of instructions."""
-        return self.files[list(self.files)[-1]].decode().split("  \n", 1)[0] if self.files else ""
+        return self._head[0]
+
+    @property
+    def notes(self) -> list[str]:
+        """Losses of the export that its user has to know of: further lines of the page."""
+        return [line for line in self._head if line.startswith("Single precision")]
+
+    @property
+    def _head(self) -> list[str]:
+        page = self.files[list(self.files)[-1]].decode() if self.files else ""
+        return page.split("\n\n", 1)[0].split("  \n")
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as a dict, as printed by ``--json``."""
