@@ -168,6 +168,11 @@ def export(
     _check_options(to, target, options, dialect)
     listener = Listener(progress)
     tests = _read(to, target, recordings, mapping, listener)
+    if Path(model).suffix.lower() == ".toml":
+        raise InputError(
+            f"{model}: a machine file cannot be exported; name the model file in it ('thermocomp position' writes one "
+            "for all axes)"
+        )
     models = [m.taken(accept_unproven) for m in read_models(Path(model))]
     refused = {m.target: why for m in models if (why := _refusal(m))}
     elsewhere = {}
