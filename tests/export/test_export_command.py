@@ -398,11 +398,11 @@ def test_a_file_that_is_no_model(tmp_path: Path, capsys: pytest.CaptureFixture[s
     error = " ".join(capsys.readouterr().err.split())
     assert str(tmp_path / "given") in error
     assert said in error
+    assert "name the file that 'thermocomp fit' wrote" in error or "name a model file" in error
 
 
 def test_a_machine_file_is_told_from_a_model_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     machine = Path(__file__).resolve().parents[2] / "docs" / "files" / "virtual.toml"
     assert run(["export", str(machine), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
     error = " ".join(capsys.readouterr().err.split())
-    assert "virtual.toml: a machine file cannot be exported; name the model file in it" in error
-    assert "name the file that 'thermocomp fit' wrote" in error or "name a model file" in error
+    assert "a machine file cannot be exported; name the model file in it" in error
