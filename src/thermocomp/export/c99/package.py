@@ -41,16 +41,22 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
     #include <math.h>                          /* NAN */
 
     static {name}_state state;                 /* zero at power-on */
-    static {name}_saved saved;                 /* read from non-volatile memory; or NULL below */
+    static {name}_saved saved;                 /* read it from non-volatile memory; zero: nothing was retained */
     static tc_real value[{inputs}];
 
-    {name}_power_up(&state, &saved, off);      /* off: seconds without power, 0 if unknown */
-    for (;;) {{                                 /* every dt seconds */
-        /* fill value[] as below; NAN for a sensor without a reading */
-        {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
-        /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
-        /* send state.correction[0] to the controller [um] */
-        {name}_save(&state, &saved);           /* and write its bytes, every ten seconds or when the power fails */
+    int main(void)
+    {{
+        double off = 0.0;                      /* seconds without power; 0: unknown */
+        double age = 0.0, dt = 10.0;           /* seconds since the values were measured, since the previous call */
+
+        {name}_power_up(&state, &saved, off);  /* on a machine that is cold for certain: {name}_cold(&state) */
+        for (;;) {{                             /* every dt seconds */
+            value[0] = NAN;                    /* fill value[] as below; NAN for a sensor without a reading */
+            {name}_step(&state, value, age, dt);
+            /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
+            /* send state.correction[0] to the controller [um] */
+            {name}_save(&state, &saved);       /* and write its bytes, every ten seconds or when the power fails */
+        }}
     }}
 
 {stopped}
