@@ -29,7 +29,7 @@ def run(lines, numbers):
         signs = {" EQ ": "==", " NE ": "!=", " LT ": "<", " GT ": ">", " LE ": "<=", " GE ": ">=", "[": "(", "]": ")"}
         for word, sign in signs.items():
             words = words.replace(word, sign)
-        return eval(words, {"numbers": numbers})
+        return eval(words, {"numbers": numbers, "ROUND": round})
     k = 0
     while lines[k] not in ("M99", "RTS"):
         line = re.sub(r"^N\\d+ ?", "", lines[k])

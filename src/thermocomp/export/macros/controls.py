@@ -102,7 +102,7 @@ HAAS = Control(
     ),
     known="By Haas's manuals: #500 to #549 are retained at power-off (Next Generation Control: #10500 to #10549, the "
     "same\nvariables), #550 to #599 belong to the probe; #5201 to #5203 are the values of G52; a block that reads an "
-    "offset stops the\nlook-ahead; a lathe removes a G52 at M30, RESET and power-off with Setting 33 = FANUC.",
+    "offset stops the\nlook-ahead; `ROUND[...]` gives a whole number; a lathe removes a G52 at M30, RESET and power-off with Setting 33 = FANUC.",
     source="A computer can write the temperatures in degC by Ethernet (*Machine Data Collection*, Setting 143: it "
     "can set some\n   macro variables, see the manual which). If a sensor fails, it must write 999;",
     load="Load `{file}` into the memory. Call it (`G65 P{program}`, so that it has its own local variables)",
@@ -125,6 +125,7 @@ OKUMA = Control(
         "no line of this was tested on an Okuma control or checked against its manuals",
         "VZOFX, VZOFY, VZOFZ as zero offsets in mm, which a program may write, and which apply from the next G15 H on",
         "that you use work coordinate systems 1 to 6 only; delete or add lines",
+        "ROUND[...] as rounding to a whole number",
         "that VC150 to VC173 are free and retained at power-off; replace them by yours",
         "who writes temperatures in degC to VC151 and following, and 999 for one that is missing",
     ),

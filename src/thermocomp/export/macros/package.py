@@ -1,5 +1,6 @@
 """A user macro for Fanuc, Haas and Okuma controls that writes a linear formula to work offsets."""
 
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -54,7 +55,7 @@ All of this is **UNCONFIRMED** on a control: have the machine builder check it.
 
 _CHECK = """\
 `{name}_vectors.csv` contains temperatures [degC], the deviation by the formula ("growth") [mm], the correction that
-the offset must reach [um], and its tolerance (the control rounds to 1 um). It includes rows beyond the trained range
+the offset must reach [um], and its tolerance (the macro rounds to 1 um). It includes rows beyond the trained range
 and the limit, and rows with an implausible temperature, where the correction must not change. `python3
 {name}_check.py` (needs only Python) runs the lines of the macro until the correction no longer changes, and compares:
 exit code 0 if all rows agree. On the control: write the temperatures of a row to the variables by MDI, set {on} = 1,
@@ -107,8 +108,8 @@ def write_macro(
             else ", programs with a G52\nneither, because the macro writes its correction there",
             known=control.known,
         ),
-        limits=f"the macro limits the correction to {most:g} um and its change to {step:g} um per call; the errors "
-        "above are those of the formula without these limits.",
+        limits=f"the macro limits the correction to {most:g} um and its change to {step:g} um per call, and rounds it "
+        "to whole um; the errors above are those of the formula without these limits and without rounding.",
         failed="if a temperature is missing or implausible, its axes keep their correction; a wrong value within the "
         "plausible range is not detected and moves them.",
         install=_INSTALL.format(
@@ -153,6 +154,7 @@ def _axis(
     yield f"{wanted}={_real(in_um(0.0 - r.model.intercept))} (TARGET IN UM: A CONTROL ACCEPTS EIGHT DIGITS)"
     for (i, factor), zero in zip(r.terms, r.zeros, strict=True):
         yield f"{wanted}={wanted}-[{_real(in_um(factor))}*[{place[i.name]}-[{_real(zero)}]]]"
+    yield f"{wanted}=ROUND[{wanted}] (WHOLE UM: WHAT AN OFFSET ROUNDS AWAY WOULD ADD UP)"
     yield f"{wanted}={wanted}/1000.0 (IN MM)"
     yield from _within(wanted, limits[0], control, label + 4)
     yield f"N{label + 2} {change}={wanted}-{force}"
@@ -175,16 +177,16 @@ def _within(variable: str, most: float, control: Control, label: int) -> Iterato
 
 
 def _cap(limits: Limits, option: str, times: float) -> float:
-    """Return a limit [um] in the digits of a control, times a factor: not larger than requested."""
+    """Return a limit times a factor in whole um, in the digits of a control: not larger than requested."""
     asked: float = getattr(limits, option)
     # exact decimal product: 0.1 um/s is 6 um per minute, without a rounding error of double precision
-    taken = float(Decimal(shorten(in_mm(float(Decimal(repr(asked)) * Decimal(times))), cap=True)).scaleb(3))
-    if not taken:
+    whole = int(Decimal(repr(asked)) * Decimal(times))
+    if not whole:
         raise InputError(
-            f"--{option} {asked:g}: numbers of a macro have eight digits, in which this value is 0: give at least "
-            f"--{option} {1e-4 / times:.2g}"
+            f"--{option} {asked:g}: a macro moves offsets in whole um: give at least --{option} "
+            f"{math.ceil(1e4 / times) / 1e4:g}"
         )
-    return taken
+    return float(Decimal(shorten(in_mm(float(whole)), cap=True)).scaleb(3))
 
 
 def _plausible(r: Reduced) -> list[tuple[float, float]]:
