@@ -102,8 +102,8 @@ HAAS = Control(
     ),
     known="By Haas's manuals: #500 to #549 are retained at power-off (Next Generation Control: #10500 to #10549, the "
     "same\nvariables), #550 to #599 belong to the probe; #5201 to #5203 are the values of G52; a block that reads an "
-    "offset stops the\nlook-ahead; `ROUND[...]` gives a whole number; a lathe removes a G52 at M30, RESET and power-off "
-    "with Setting 33 =\nFANUC.",
+    "offset stops the\nlook-ahead; `ROUND[...]` gives a whole number; a lathe removes a G52 at M30, RESET and power-"
+    "off with Setting 33 =\nFANUC.",
     source="A computer can write the temperatures in degC by Ethernet (*Machine Data Collection*, Setting 143: it "
     "can set some\n   macro variables, see the manual which). If a sensor fails, it must write 999;",
     load="Load `{file}` into the memory. Call it (`G65 P{program}`, so that it has its own local variables)",
