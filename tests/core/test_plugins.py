@@ -2,17 +2,22 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
+import textwrap
+import tomllib
 import zipfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from driftmodels import lags
+from driftmodels import ACCEPTED, growing, lags
 from reviseruns import judged, write_models
 from smallmachine import small_machine
 
+from thermocomp.files import modelfile
 from thermocomp.recordings.readers import recordings
 
 CODE = '''
@@ -131,21 +136,42 @@ for line in sys.stdin:
 """
 
 
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder into which pip has installed the package."""
-    folder = tmp_path_factory.mktemp("plugin")
-    wheel, info = folder / "tinyplug-1.0-py3-none-any.whl", "tinyplug-1.0.dist-info"
+def build(folder: Path, name: str, code: str, entries: str) -> Path:
+    """Write the wheel of a package of one module."""
+    wheel, info = folder / f"{name}-1.0-py3-none-any.whl", f"{name}-1.0.dist-info"
     with zipfile.ZipFile(wheel, "w") as file:
-        file.writestr("tinyplug.py", CODE)
-        file.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: tinyplug\nVersion: 1.0\n")
+        file.writestr(f"{name}.py", code)
+        file.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
         file.writestr(
             f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
         )
-        file.writestr(f"{info}/entry_points.txt", ENTRIES)
+        file.writestr(f"{info}/entry_points.txt", entries)
         file.writestr(f"{info}/RECORD", "")
+    return wheel
+
+
+def of_the_page(folder: Path) -> Path:
+    """Build the package of the page on own targets, from its text alone."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "own_target.rst").read_text(encoding="utf-8")
+    code, toml = (
+        textwrap.dedent(re.search(rf"   .. code-block:: {kind}\n\n((?:      .*\n|\n)+)", page)[1])  # type: ignore[index]
+        for kind in ("python", "toml")
+    )
+    project = tomllib.loads(toml)["project"]
+    entries = [
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in those.items())
+        for group, those in project["entry-points"].items()
+    ]
+    return build(folder, project["name"], code, "\n".join(entries))
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder into which pip has installed the packages."""
+    folder = tmp_path_factory.mktemp("plugin")
+    wheels = [str(build(folder, "tinyplug", CODE, ENTRIES)), str(of_the_page(folder))]
     site = folder / "site"
-    words = ["-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--target", str(site), str(wheel)]
+    words = ["-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--target", str(site), *wheels]
     subprocess.run([sys.executable, *words], check=True, capture_output=True)
     return site
 
@@ -202,6 +228,31 @@ def test_a_method_and_an_export(thermocomp: Thermocomp, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "thermal.txt").read_text() == "z_um"
     _, err = thermocomp("export", "model.json", "--to", "broken", "-o", "out2", code=2)
     assert "plug-in broken (thermocomp.exporters) of the package tinyplug cannot be loaded: AttributeError" in err
+
+
+def test_the_targets_of_the_page(thermocomp: Thermocomp, tmp_path: Path) -> None:
+    """The page on own targets is enough: its package exports a formula that is right, and the C code in a frame."""
+    modelfile.write([growing("z_um", 3.0)], tmp_path / "line.json")
+    thermocomp("export", "line.json", "--to", "panel", "-o", "out", "--date", "2026-01-31")
+    assert (tmp_path / "out" / "tc_thermal.txt").read_text() == "Z = LIMIT(500.0, -0.0+-3.0*(t-20.0))\n"
+    rows = (tmp_path / "out" / "tc_thermal_vectors.csv").read_text().splitlines()[1:]
+    for axis, correction, heat in (row.split(",") for row in rows):
+        assert axis == "Z"
+        assert float(correction) == pytest.approx(-3.0 * (float(heat) - 20.0))
+    assert (
+        (tmp_path / "out" / "tc_thermal.md").read_text().startswith("z_um: accepted on unseen cycles; the full model")
+    )
+    write_models([judged(lags("z_um", 1.0))], str(tmp_path / "model.json"))
+    recordings.write(small_machine(), tmp_path / "drift.csv")
+    thermocomp("export", "model.json", "--to", "framed", "-o", "out2")
+    assert (tmp_path / "out2" / "tc_thermal_send.c").read_text() == "send(0, state.correction[0]); /* z_um [um] */\n"
+    assert "whole model" in thermocomp("export", "model.json", "drift.csv", "--to", "framed", "-o", "no", code=2)[1]
+    _, err = thermocomp("export", "model.json", "--to", "panel", "-o", "no", code=2)
+    assert "panel supports only a linear formula of up to 2 temperatures" in err
+    lost = replace(growing("z_um", 3.0), honest_error=replace(ACCEPTED, verdict="unproven"))
+    modelfile.write([lost], tmp_path / "line.json", overwrite=True)
+    thermocomp("export", "line.json", "--to", "panel", "-o", "no", code=1)
+    assert not (tmp_path / "no").exists()
 
 
 def test_a_source(thermocomp: Thermocomp, tmp_path: Path) -> None:

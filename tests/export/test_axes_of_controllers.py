@@ -1,5 +1,6 @@
 """What SINUMERIK and TwinCAT CNC take: offset, slope and place, run by the machine of structured text."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -15,12 +16,15 @@ from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
+from thermocomp.core.reading import Reading
 from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.axes import find_drives, write_values
 from thermocomp.export.beckhoff import package as beckhoff
+from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
 from thermocomp.export.siemens import package as siemens
+from thermocomp.export.st import package as stpackage
 from thermocomp.export.st.structuredtext import translate
 from thermocomp.export.vectors import Readings
 from thermocomp.runtime.compensator import Compensator
@@ -100,6 +104,45 @@ def test_slopes_run_in_c_and_in_structured_text() -> None:
         assert np.abs(said.slope).max() > 10.0
         assert set(said.status.ravel()) == {1, 2, 3}
         check_block(compensator, Readings(rows, np.zeros(200), np.full(200, 10.0)))
+
+
+def three_axes() -> list[PositionModel]:
+    """Screws of X, Y and Z, each with a bearing and an end of its own."""
+    found = []
+    for k, axis in enumerate("XYZ"):
+        slopes = (replace(model("um/m", 12.0 + k), target=f"E{axis}{axis}"),)
+        offset = replace(model("um", -3.0 * k), target=f"E{axis}{axis}") if k else None
+        one = replace(screw(1.0), target=f"E{axis}{axis}", axis=axis, offset=offset, slopes=slopes)
+        found.append(replace(one, travel=(-200.0, 600.0 + 100.0 * k), reference_position=100.0 * k))
+    return found
+
+
+def test_three_axes_are_one_block_and_the_page_tells_the_correction_at_a_position() -> None:
+    """The formula of the page, with its numbers, is `Correction.at` along the travel."""
+    compensator = Compensator.of(three_axes(), Limits(magnitude=30.0, rate=1e6))
+    rows = np.concatenate([np.full((40, 1), 23.0), np.full((40, 1), 24.5), np.full((40, 1), 35.0)])
+    said = check_c99(compensator, rows, np.full(len(rows), 10.0))
+    check_block(compensator, Readings(rows, np.zeros(len(rows)), np.full(len(rows), 10.0)))
+    page = cpackage.write_package(compensator, "mill", FACTS)["tc_mill.md"].decode()
+    assert (
+        "`correction[k] + slope[k] * (p - p0) / 1000`"
+        in stpackage.write_package(compensator, "mill", FACTS)["tc_mill.md"].decode()
+    )
+    table = {
+        t: (int(k), float(p)) for k, t, p in re.findall(r"\| `correction\[(\d)\]` \[um\] \| (\w+) \| (\S+) mm \|", page)
+    }
+    travels = {t: (float(a), float(b)) for t, a, b in re.findall(r"(E\w\w) (-?\d+) to (\d+) mm", page)}
+    assert set(table) == set(travels) == {"EXX", "EYY", "EZZ"}
+    state, now = compensator.start(), 0.0
+    for row in rows:
+        now += 10.0
+        state, out = compensator.step(state, Reading(now, {"screw_C": float(row[0])}), now)
+    for target, (k, p0) in table.items():
+        for p in np.linspace(*travels[target], 5):
+            value = said.correction[-1, k] + said.slope[-1, k] * (p - p0) / 1000.0
+            assert value == pytest.approx(out.corrections[target].at(float(p)), abs=1e-9)
+            assert abs(value) <= 30.0 + 1e-9
+    assert max(abs(said.slope[-1])) > 20.0
 
 
 @pytest.mark.parametrize("of", [siemens, beckhoff])

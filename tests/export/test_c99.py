@@ -1,11 +1,13 @@
 """The C code of a compensator does what the compensator does: compiled by a real compiler, for every family."""
 
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from compiledblock import COMPILERS, OPTIMISED, SANITIZED, CompiledBlock, check_block, check_same
+from compiledblock import COMPILERS, FLAGS, OPTIMISED, SANITIZED, CompiledBlock, check_block, check_same
 from driftmodels import ACCEPTED
 from families import CURVES, FAMILIES, HEAD, INPUTS, READINGS, SINGLES
 from hypothesis import HealthCheck, given, settings
@@ -21,11 +23,14 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.export.c99.c99 import translate
+from thermocomp.export.c99.package import write_package
+from thermocomp.export.facts import Facts
 from thermocomp.export.vectors import Readings, make_readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 
 FloatArray = NDArray[np.float64]
+FACTS = Facts("model.json", "", "0", "2026-01-31")
 FREE = Limits(magnitude=1e9, rate=1e9)
 SLOW: dict[str, Any] = {"max_examples": 10, "suppress_health_check": [HealthCheck.too_slow], "deadline": None}
 
@@ -188,3 +193,18 @@ def test_nothing_that_comes_in_moves_it_beyond_its_limits(
     moved = np.abs(np.diff(said.correction[:, 0], prepend=0.0))
     assert (np.abs(said.correction) <= 5.0).all()
     assert (moved <= 0.05 * np.clip(np.nan_to_num(dt), 0.0, 60.0) + 1e-9).all()
+
+
+@pytest.mark.parametrize("flags", [("-UTC_FLOAT",), ("-DTC_FLOAT",)])
+def test_the_program_of_the_page_compiles_and_runs(tmp_path: Path, flags: tuple[str, ...]) -> None:
+    """As it stands on the page, with all warnings; its loop ends here after three calls."""
+    texts = write_package(Compensator.of([watched_model("z_um")]), "mill", FACTS)
+    page = texts["tc_mill.md"].decode().partition("## Run it")[2].partition("\n## ")[0]
+    lines = [line[4:] for line in page.splitlines() if line.startswith("    ") or not line]
+    program = "\n".join(lines).replace("for (;;)", "for (int k = 0; k < 3; k++)")
+    assert program.count("k++") == 1
+    for file, text in {**texts, "main.c": program.encode()}.items():
+        (tmp_path / file).write_bytes(text)
+    command = [COMPILERS[0], *FLAGS, *flags, "tc_mill.c", "main.c", "-lm", "-o", "main"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    subprocess.run(["./main"], cwd=tmp_path, check=True)

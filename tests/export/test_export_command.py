@@ -357,7 +357,7 @@ def test_limits_at_the_ends_of_what_they_may_be(tmp_path: Path, limits: list[str
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("to", ["c99", "st", "linuxcnc"])
+@pytest.mark.parametrize("to", ["c99", "st", "linuxcnc", "siemens", "beckhoff"])
 def test_a_name_in_any_script_stands_as_it_is(tmp_path: Path, to: str) -> None:
     model = watched_model("z_um")
     assert model.watch is not None
@@ -399,3 +399,10 @@ def test_a_file_that_is_no_model(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert str(tmp_path / "given") in error
     assert said in error
     assert "name the file that 'thermocomp fit' wrote" in error or "name a model file" in error
+
+
+def test_a_machine_file_is_told_from_a_model_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine = Path(__file__).resolve().parents[2] / "docs" / "files" / "virtual.toml"
+    assert run(["export", str(machine), "--to", "c99", "-o", str(tmp_path / "out")]) == 2
+    error = " ".join(capsys.readouterr().err.split())
+    assert "a machine file cannot be exported; name the model file in it" in error

@@ -17,6 +17,7 @@ from thermocomp.recordings.readers import recordings
 
 NAMES = ["tc_thermal.md", "tc_thermal_check.py", "tc_thermal_reduced.svg", "tc_thermal_vectors.csv"]
 MAIN = {"klipper": "tc_thermal.cfg", "heidenhain": "tc_thermal.txt", "fanuc": "tc_thermal.nc"}
+MAIN |= {"haas": "tc_thermal.nc", "okuma": "tc_thermal.SSB"}
 
 
 def written(folder: Path, *models: ErrorModel) -> str:
@@ -109,6 +110,8 @@ def test_recordings_where_they_are_needed(tmp_path: Path, capsys: pytest.Capture
     assert "name recordings for its reduction" in told("--to", "klipper")
     assert "c99 exports the whole model and accepts no recordings" in told(drift, "--to", "c99")
     assert "no such temperature" in told(drift, "--to", "klipper", "--sensors", "t9_C")
+    assert "--program 0: expected a program number from 1 to 9999" in told(drift, "--to", "haas", "--program", "0")
+    assert "--program: klipper does not support this option" in told(drift, "--to", "klipper", "--program", "812")
     assert "--axes z_um: expected a target and X, Y or Z" in told(drift, "--to", "klipper", "--axes", "z_um")
     assert "no such target" in told(drift, "--to", "klipper", "--axes", "ch5_um=Z")
 

@@ -31,8 +31,11 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.position import PositionModel
 from thermocomp.core.profile import coordinates
+from thermocomp.core.terms import Variable
 from thermocomp.core.zero import Zeroing
 from thermocomp.export.facts import Facts
+from thermocomp.export.onnx import nodes
+from thermocomp.export.onnx.graph import translate
 from thermocomp.export.onnx.package import NOT_INSIDE, write_package
 from thermocomp.export.onnx.vectors import answer, make_readings
 from thermocomp.export.vectors import make_readings as make_faults
@@ -346,11 +349,39 @@ def test_the_file_says_what_it_is_and_is_the_same_each_time() -> None:
         assert said["sign"].startswith("a correction [um] is added to the commanded position")
         assert said["units"].startswith("temperatures in degC")
         assert said["deviation"] == f"{file[len(name) + 1 : -5]} [um]"
+        assert (said["target"], said["unit"]) == (file[len(name) + 1 : -5], "um")
+        names = json.loads(said["inputs"])
+        assert len(names) == model.graph.input[0].type.tensor_type.shape.dim[0].dim_value
+        ports = {p.name: p.doc_string for p in (*model.graph.input, *model.graph.output)}
+        assert [words.split(" [")[0] for words in ports["value"].split(", ")] == names
+        assert ports["value"] == said["value"]
+        assert ports["zero"] == said["zeros"]
+        assert ports["deviation"] == f"{said['target']} [um], actual minus commanded"
+        assert all(ports.values())
         assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.DOUBLE}
     assert verdicts == [
         "z_um: accepted on unseen cycles",
         "SHADOW ONLY, y_um: not proven on unseen cycles; all corrections stay zero",
     ]
+
+
+def test_zeros_are_stated_and_names_are_those_of_the_sensors() -> None:
+    plain = growing("z_um", 1.0)
+    (heat,) = plain.inputs
+    inputs = (replace(heat, name="\u4e3b\u8f74"), replace(heat, name="oil", rezero=False, reference=21.5))
+    model = replace(plain, inputs=inputs, variables=(Variable.single("\u4e3b\u8f74", 0),))
+    files = write_package(Compensator.of([model]), "mill", FACTS)
+    said = {p.key: p.value for p in onnx.load_from_string(files["tc_mill_z_um.onnx"]).metadata_props}
+    assert json.loads(said["inputs"]) == ["\u4e3b\u8f74", "oil"]
+    assert said["zeros"] == "\u4e3b\u8f74: mean at the start, oil: 21.5 degC"
+
+
+def test_no_lower_opset_has_its_operators(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = replace(watched_model("z_um"), support=Support("fade"), joint=JOINT)
+    assert onnx.load_from_string(translate(model).serialize("m", ["facts"], {}, "0")).opset_import[0].version == 13
+    monkeypatch.setattr(nodes, "OPSET", 12)
+    with pytest.raises((onnx.checker.ValidationError, onnx.shape_inference.InferenceError)):
+        translate(model).serialize("m", ["facts"], {}, "0")
 
 
 def test_targets_with_like_names_have_files_of_their_own() -> None:

@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from watchedmachine import watched_model
 
+from thermocomp.cli.app import run
 from thermocomp.core.additive import Additive
 from thermocomp.core.autoregressive import Autoregressive
 from thermocomp.core.bounds import COEFFICIENT, LEAST, round_single
@@ -33,11 +34,15 @@ from thermocomp.export.facts import Facts
 from thermocomp.export.onnx import package as onnxpackage
 from thermocomp.export.st import package as stpackage
 from thermocomp.export.vectors import Readings, make_readings, round_all
+from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 
 FACTS = Facts("model.json", "0" * 64, "1.0", "2026-01-31")
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
+
+
+WORDS = {"refused": "does not compile", "loss": "changes corrections by"}
 
 
 def prove(folder: Path, texts: dict[str, bytes], switch: str) -> str:
@@ -201,8 +206,10 @@ def test_points_of_a_curve_that_single_precision_does_not_tell_apart(tmp_path: P
 
 
 @needs_compiler
-@pytest.mark.parametrize("factor", [100.0, 1e4])
-def test_large_coefficients_make_more_of_the_last_digit(tmp_path: Path, factor: float) -> None:
+@pytest.mark.parametrize("factor", [100.0, 1500.0, 1e4])
+def test_large_coefficients_make_more_of_the_last_digit(
+    tmp_path: Path, factor: float, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Temperatures that hardly move: thousands of micrometres per kelvin, which cancel."""
     names = [f"t{k}_C" for k in range(3)]
     model = Polynomial(
@@ -213,9 +220,22 @@ def test_large_coefficients_make_more_of_the_last_digit(tmp_path: Path, factor: 
         terms=((0,), (1,), (2,)),
         coefficients=(3.0 * factor, 2.0 * factor, -4.0 * factor),
     )
-    texts = cpackage.write_package(Compensator.of([replace(model, honest_error=ACCEPTED)]), "x", FACTS)
-    for switch in ("-UTC_FLOAT", "-DTC_FLOAT"):
-        assert " 0 wrong" in prove(tmp_path, texts, switch)
+    model = replace(model, honest_error=ACCEPTED)
+    texts = cpackage.write_package(Compensator.of([model]), "x", FACTS)
+    assert " 0 wrong" in prove(tmp_path, texts, "-UTC_FLOAT")
+    modelfile.write([model], tmp_path / "model.json")
+    assert run(["export", str(tmp_path / "model.json"), "--to", "c99", "-o", str(tmp_path / "out")]) == 0
+    assert ("\nSingle precision (-DTC_FLOAT) " in capsys.readouterr().out) == (factor > 100.0)
+    single, page = prove(tmp_path, texts, "-DTC_FLOAT"), texts["tc_x.md"].decode()
+    stated = {name: "\nSingle precision (-DTC_FLOAT) " + words in page for name, words in WORDS.items()}
+    if factor == 1e4:
+        assert "single precision is too coarse" in single  # by up to 0.61 um
+        assert stated == {"refused": True, "loss": False}
+    else:
+        assert " 0 wrong" in single
+        assert stated == {"refused": False, "loss": factor > 100.0}
+        if factor > 100.0:
+            assert 0.05 < float(re.findall(r"corrections by up to ([\d.]+) um", page)[0]) < 0.5
 
 
 def slow(*poles: float) -> Autoregressive:

@@ -1,11 +1,13 @@
 """Whole recordings through the C code, and a million readings of sensors that fail in every way."""
 
+import re
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from compiledblock import COMPILERS, CompiledBlock
+from everymethod import documented
 from spoiling import models_of, spoiled
 
 from thermocomp.core.correction import Limits
@@ -56,6 +58,43 @@ def check_recording(recording: Recording, targets: list[str], method: str, folde
         decisions, apart = count_apart(said, single.run(readings))
         assert decisions == 0
         assert apart < (3e-5 if method == "averaged" else 5e-4)  # a temperature in single precision is off by 1e-6 degC
+
+
+def methods() -> list[object]:
+    """Return the methods that can be exported: one in an ordinary run."""
+    found = [m for m, (_, whole, _) in documented().items() if whole != "no"]
+    return [m if m == "dynamic" else pytest.param(m, marks=pytest.mark.long) for m in found]
+
+
+@pytest.mark.parametrize("machine", ["demo", "fl_thermal"])
+@pytest.mark.parametrize("method", methods())
+def test_single_precision_is_within_a_twentieth_of_a_micrometre_or_said(
+    machine: str, method: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """In use, by every method: else the export states the loss, and does not compile above 0.5 um."""
+    if machine == "demo":
+        recording, targets = virtual.record("demo")[0], ["z_um", "y1_um"]
+    else:
+        recording = read(request.getfixturevalue("shared_data") / "fl_thermal" / "recording.csv")
+        targets = ["ch1_um", "ch3_um", "ch5_um"]
+    compensator = Compensator.of(models_of(recording, targets, method), Limits(rate=1e3, magnitude=1e4))
+    for folder in ("double", "single"):
+        (tmp_path / folder).mkdir()
+    double = CompiledBlock(compensator, tmp_path / "double")
+    single = CompiledBlock(compensator, tmp_path / "single", flags=("-DTC_FLOAT",))
+    readings = readings_of(recording, double)
+    one, other = double.run(readings), single.run(readings)
+    assert (one.passed == other.passed).all()
+    assert (one.status == other.status).all()
+    assert (one.fault == other.fault).all()
+    apart = float(np.abs(one.correction - other.correction).max())
+    page = write_package(compensator, "x", Facts("model.json", "", "0", "2026-01-31"))["tc_x.md"].decode()
+    stated = re.findall(
+        r"^Single precision \(-DTC_FLOAT\) (changes corrections by up to .* um|does not compile)", page, re.M
+    )
+    print(f"{machine} {method}: {apart:.1e} um {stated}")
+    assert apart <= 0.05 or stated
+    assert apart <= 0.5 or stated == ["does not compile"]
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from thermocomp.recordings.recording import Recording
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "export.rst"
 WHOLE = ("c99", "linuxcnc", "st", "st-twincat", "st-scl", "siemens", "beckhoff", "onnx")
-REDUCED = ("klipper", "heidenhain", "fanuc")
+REDUCED = ("klipper", "heidenhain", "fanuc", "haas", "okuma")
 
 
 def without_speed(recording: Recording) -> Recording:

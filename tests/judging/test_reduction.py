@@ -161,7 +161,7 @@ def test_what_has_the_shape_already_is_taken_as_it_is() -> None:
     model = replace(full(recording), honest_error=JUDGED)
     assert fits(model, SHAPES["heidenhain"])
     assert not fits(model, SHAPES["klipper"])
-    assert not fits(full(recording, "dynamic"), SHAPES["fanuc"])
+    assert not fits(full(recording, "dynamic"), SHAPES["macro"])
     r = as_it_is(model, "Z")
     assert (r.loss, r.why_not(1.0)) == (1.0, "")
     warm, zero = temperatures(recording)

@@ -21,51 +21,54 @@ def answers(text, rows):
         yield -1e3 * eval(formula), float(row["correction_um"])
 """
 
-FANUC = '''
+MACRO = '''
 def run(lines, numbers):
     """Run the few instructions that occur in this macro."""
     def value(words):
-        words = re.sub(r"#(\\d+)", lambda m: f"numbers.get({m[1]}, None)", words.replace("#0", "None"))
-        for was, becomes in (("EQ", " == "), ("NE", " != "), ("LT", " < "), ("GT", " > "), ("[", "("), ("]", ")")):
-            words = words.replace(was, becomes)
-        return eval(words, {"numbers": numbers})
+        words = re.sub(r"#\\d+|[A-Z]+\\d+", lambda m: f"numbers.get('{m[0]}')", words)
+        signs = {" EQ ": "==", " NE ": "!=", " LT ": "<", " GT ": ">", " LE ": "<=", " GE ": ">=", "[": "(", "]": ")"}
+        for word, sign in signs.items():
+            words = words.replace(word, sign)
+        return eval(words, {"numbers": numbers, "ROUND": round})
     k = 0
-    while not lines[k].startswith("M99"):
-        line = re.sub(r"^N\\d+", "", lines[k])
+    while lines[k] not in ("M99", "RTS"):
+        line = re.sub(r"^N\\d+ ?", "", lines[k])
         k += 1
-        if found := re.fullmatch(r"IF(\\[.*\\])GOTO(\\d+)", line):
+        if found := re.fullmatch(r"IF \\[(.*)\\] (GOTO|N)(\\d+)", line):
             if value(found[1]):
-                k = next(j for j, other in enumerate(lines) if re.match(rf"N{found[2]}(\\D|$)", other))
-        elif found := re.fullmatch(r"IF(\\[.*\\])THEN#(\\d+)=(.*)", line):
-            if value(found[1]):
-                numbers[int(found[2])] = value(found[3])
-        elif found := re.fullmatch(r"#(\\d+)=(.*)", line):
-            numbers[int(found[1])] = value(found[2])
+                k = next(j for j, other in enumerate(lines) if re.match(rf"N{found[3]}( |$)", other))
+        elif found := re.fullmatch(r"([^ =]+)=(.*)", line):
+            numbers[found[1]] = value(found[2])
         elif line:
             raise SystemExit(f"unknown: {line}")
 
 
 def answers(text, rows):
-    inputs = dict(re.findall(r"^\\((#\\d+): (\\w+) IN DEGC", text, re.M))
-    forces = dict(re.findall(r"^\\((#\\d+): CORRECTION OF ([XYZ]) IN FORCE", text, re.M))
-    lines = [re.sub(r"\\(.*?\\)", "", line).replace(" ", "") for line in text.splitlines()]
-    lines = [line for line in lines if line and not re.match(r"%|O\\d", line)]
+    inputs = {name: place for place, name in re.findall(r"^\\((\\S+): (\\w+) IN DEGC", text, re.M)}
+    [on] = re.findall(r"^\\((\\S+): 1 IS ON", text, re.M)
+    missing = None if on.startswith("#") else 999.0
+    moved, lines = {}, []
+    for line in re.sub(r"(VZOF.)\\[(\\d+)\\]", r"\\1\\2", text).splitlines():
+        if found := re.match(r"\\((\\S+): CORRECTION OF ([XYZ]) IN FORCE", line):
+            moved[axis := found[2]] = [found[1]]
+        line = re.sub(r"\\(.*?\\)", "", line).strip()
+        if found := re.match(r"(#5\\d\\d\\d|VZOF.\\d+)=", line):
+            moved[axis].append(found[1])
+        if line and not re.match(r"%|O\\d", line):
+            lines.append(line)
     for row in rows:
-        numbers = {500: 1}
-        for number in forces:
-            numbers[int(number[1:])] = 0.0
-        for axis, place in zip("XYZ", (5201, 5202, 5203)):
-            numbers[place] = 0.0
-        for number, name in inputs.items():
-            value = {key.upper(): value for key, value in row.items()}[name + "_DEGC"]
-            if value:
-                numbers[int(number[1:])] = float(value)
+        numbers = {on: 1.0, **{place: 0.0 for places in moved.values() for place in places}}
+        named = {key.upper(): value for key, value in row.items()}
+        for name, place in inputs.items():
+            value = named[name + "_DEGC"] or missing
+            if value is not None:
+                numbers[place] = float(value)
         before = None
         while numbers != before:  # call until the correction no longer changes
             before = dict(numbers)
             run(lines, numbers)
-        place = {axis: int(number[1:]) for number, axis in forces.items()}[row["axis"]]
-        yield 1e3 * numbers[place], float(row["correction_um"])
+        wanted = float(row["correction_um"])
+        yield max((1e3 * numbers[place] for place in moved[row["axis"]]), key=lambda um: abs(um - wanted)), wanted
 '''
 
 _SCRIPT = '''"""Compare {file}, or a file given as argument, with {name}_vectors.csv: exit code 0 if all agree."""
@@ -92,9 +95,7 @@ print(f"{{len(rows)}} vectors, {{wrong}} wrong; largest difference {{worst:.2g}}
 sys.exit(1 if wrong else 0)
 '''
 
-_FILES = {KLIPPER: "cfg", HEIDENHAIN: "txt", FANUC: "nc"}
 
-
-def write_script(answers: str, name: str) -> str:
-    """Return the source of the Python script that runs the test vectors."""
-    return _SCRIPT.format(name=name, file=f"{name}.{_FILES[answers]}", answers=answers)
+def write_script(answers: str, name: str, ending: str) -> str:
+    """Return the source of the Python script that runs the test vectors of the file with an ending."""
+    return _SCRIPT.format(name=name, file=f"{name}.{ending}", answers=answers)

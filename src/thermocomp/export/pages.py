@@ -22,6 +22,17 @@ _POWER = """The temperatures of a warm machine must not become the zero. After a
 message, not reliable enough to decide."""
 
 
+def _geometry(tables: Tables, of: str) -> str:
+    """Return how a correction is computed at a position."""
+    ends = zip(*(tables.values[k] for k in ("travel_low", "travel_high")), strict=True)
+    travels = ", ".join(f"{t} {a:g} to {b:g} mm" for t, (a, b) in zip(tables.targets, ends, strict=True) if a < b)
+    return (
+        "Only the thermal change of an axis error is corrected; its profile stays a table of the controller. The "
+        f"correction\nat a position p [mm] is `{of}correction[k] + {of}slope[k] * (p - p0) / 1000` [um], with p0 from "
+        f"the table, and p within the\nmeasured travel ({travels}): outside, use its end.\n\n"
+    )
+
+
 def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str, object]:
     """Return the parts of the instruction page as text, by name."""
     slopes = any(tables.values["to_slope"])
@@ -49,10 +60,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         f"{zeroing.at_rest:g} s while the spindle is stopped; until then the correction does not change."
         if tables.sizes["has_zero"]
         else "No input is relative to the start.",
-        "geometry": "Only the thermal change of an axis error is corrected; its profile stays a table of the "
-        "controller.\n\n"
-        if slopes
-        else "",
+        "geometry": _geometry(tables, of) if slopes else "",
         "sign": "With the spindle stopped and a dial indicator on the axis, send +20 um to the controller instead of a "
         "correction:\nthe axis must move by 0.02 mm in its positive direction, and back with 0. If it moves the other "
         "way, reverse the sign\nwhere the correction is sent to the controller, nowhere else. Do not test with made-up "

@@ -85,7 +85,8 @@ def export_reduced(
     name = f"tc_{mark(order.name)}"
     drawn = [reductions[r.model.target] for r in found if r.model.target in reductions]
     figure = f"{name}_reduced.svg" if drawn else ""
-    texts = order.target.write(found, order.limits, name, order.facts, figure=figure)
+    more_settings = {"program": options.program} if order.target.program else {}
+    texts = order.target.write(found, order.limits, name, order.facts, figure=figure, **more_settings)
     return Outcome((_figure(figure, drawn) if drawn else {}) | texts, refused, elsewhere)
 
 

@@ -29,6 +29,8 @@ class Target:
         `write` accepts ``dialect``, one of these.
     magnitude : float
         Largest correction that the controller can represent [um].
+    program : bool
+        `write` accepts ``program``, a program number.
     limited : bool
         The controller limits the correction to the magnitude of `Limits`.
     """
@@ -39,6 +41,7 @@ class Target:
     corrected: str = ""
     dialects: tuple[str, ...] = ()
     magnitude: float = RANGE
+    program: bool = False
     limited: bool = True
 
 

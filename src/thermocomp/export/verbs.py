@@ -56,7 +56,17 @@ class ExportedCode:
     @property
     def verdict(self) -> str:
         """Verdict on the model: first line of the page of instructions."""
-        return self.files[list(self.files)[-1]].decode().split("  \n", 1)[0] if self.files else ""
+        return self._head[0]
+
+    @property
+    def notes(self) -> list[str]:
+        """Losses of the export that its user has to know of: further lines of the page."""
+        return [line for line in self._head if line.startswith("Single precision")]
+
+    @property
+    def _head(self) -> list[str]:
+        page = self.files[list(self.files)[-1]].decode() if self.files else ""
+        return page.split("\n\n", 1)[0].split("  \n")
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as a dict, as printed by ``--json``."""
@@ -98,22 +108,23 @@ def export(
     the model alone, with a program that runs it inside such a compensator. A refused model is not exported; the
     correction of an unproven one stays zero.
 
-    klipper, heidenhain and fanuc support simpler models only: the best one of these is fitted to recordings, judged on
-    unseen cycles next to the full model, and written with the loss of accuracy.
+    klipper, heidenhain, fanuc, haas and okuma support simpler models only: the best one of these is fitted to
+    recordings, judged on unseen cycles next to the full model, and written with the loss of accuracy.
 
     Parameters
     ----------
     model : str or Path
         Model file from ``thermocomp fit`` or ``thermocomp position``.
-    to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc'}
+    to : {'c99', 'st', 'siemens', 'beckhoff', 'linuxcnc', 'onnx', 'klipper', 'heidenhain', 'fanuc', \
+'haas', 'okuma'}
         Output format. c99: a header and a source file in C99, for a DSP, a PLC or a computer; st: a function block in
         structured text, IEC 61131-3; siemens, beckhoff: the same, with the parameters of the temperature compensation
         of these controllers; linuxcnc: the C99 code as a HAL component, and a HAL file that corrects X, Y and Z; onnx:
         each model as a graph, for a computer with an ONNX runtime; klipper: settings of z_thermal_adjust; heidenhain: a
-        formula; fanuc: a macro.
+        formula; fanuc, haas, okuma: a macro.
     recordings : Recording, path, DataFrame, or sequence of them, optional
-        CSV, XLSX or Parquet files to which the simpler model of klipper, heidenhain and fanuc is fitted; each one is a
-        separate test.
+        CSV, XLSX or Parquet files to which the simpler model of such a controller is fitted; each one is a separate
+        test.
     name : str
         Name of the files and functions, after the prefix ``tc_``.
     dialect : {'codesys', 'twincat', 'scl', 'iec'}, optional
@@ -157,6 +168,11 @@ def export(
     _check_options(to, target, options, dialect)
     listener = Listener(progress)
     tests = _read(to, target, recordings, mapping, listener)
+    if Path(model).suffix.lower() == ".toml":
+        raise InputError(
+            f"{model}: a machine file cannot be exported; name the model file in it ('thermocomp position' writes one "
+            "for all axes)"
+        )
     models = [m.taken(accept_unproven) for m in read_models(Path(model))]
     refused = {m.target: why for m in models if (why := _refusal(m))}
     elsewhere = {}
@@ -245,6 +261,10 @@ def _check_options(to: str, target: Target, found: ReductionOptions, dialect: Di
     """Reject options that a target ignores."""
     if dialect is not None and dialect not in target.dialects:
         raise InputError(f"--dialect {dialect}: {to} does not support it; --to st does")
+    if not 1 <= found.program <= 9999:
+        raise InputError(f"--program {found.program}: expected a program number from 1 to 9999")
+    if not target.program and found.program != ReductionOptions.program:
+        raise InputError(f"--program: {to} does not support this option")
     if target.shape is not None:
         return
     plain = ReductionOptions(axes=found.axes if target.axes else None)

@@ -41,16 +41,22 @@ Call it cyclically, every ten seconds, with the time since the previous call, me
     #include <math.h>                          /* NAN */
 
     static {name}_state state;                 /* zero at power-on */
-    static {name}_saved saved;                 /* read from non-volatile memory; or NULL below */
+    static {name}_saved saved;                 /* read it from non-volatile memory; zero: nothing was retained */
     static tc_real value[{inputs}];
 
-    {name}_power_up(&state, &saved, off);      /* off: seconds without power, 0 if unknown */
-    for (;;) {{                                 /* every dt seconds */
-        /* fill value[] as below; NAN for a sensor without a reading */
-        {name}_step(&state, value, age, dt);   /* age: seconds since the values were measured */
-        /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
-        /* send state.correction[0] to the controller [um] */
-        {name}_save(&state, &saved);           /* and write its bytes, every ten seconds or when the power fails */
+    int main(void)
+    {{
+        double off = 0.0;                      /* seconds without power; 0: unknown */
+        double age = 0.0, dt = 10.0;           /* seconds since the values were measured, since the previous call */
+
+        {name}_power_up(&state, &saved, off);  /* on a machine that is cold for certain: {name}_cold(&state) */
+        for (;;) {{                             /* every dt seconds */
+            value[0] = NAN;                    /* fill value[] as below; NAN for a sensor without a reading */
+            {name}_step(&state, value, age, dt);
+            /* or, with readings that are numbered: {name}_step_counted(&state, value, age, dt, reading) */
+            /* send state.correction[0] to the controller [um] */
+            {name}_save(&state, &saved);       /* and write its bytes, every ten seconds or when the power fails */
+        }}
     }}
 
 {stopped}
@@ -88,8 +94,10 @@ compensation at the same time.
 
 #: largest error of the difference of two readings, in units of the last digit
 _DIGITS = 2.0
-#: largest error of single precision as a fraction of the correction; above it, single precision is rejected
-_COARSE = 1.0
+#: loss of single precision [um] above which it is stated, and above which single precision is rejected
+_STATED, _COARSE = 0.05, 0.5
+#: largest tolerance of a test in single precision, as a fraction of the correction
+_TOLERANCE = 1.0
 
 
 def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
@@ -97,7 +105,13 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     tables, said = gather(compensator), facts.lines(compensator)
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
-    single = _single(compensator, tables, readings, answers)
+    single, loss = _single(compensator, tables, readings, answers)
+    if loss > _STATED or not single:
+        said.append(
+            f"Single precision (-DTC_FLOAT) changes corrections by up to {loss:.2g} um"
+            if single
+            else f"Single precision (-DTC_FLOAT) does not compile: it is too coarse for this model ({loss:.2g} um)"
+        )
     sources = translate(tables, name, said, double_only=not single)
     name = sources.name
     texts = {
@@ -125,26 +139,37 @@ def _double(compensator: Compensator, tables: Tables, readings: Readings, answer
     return max(find_tolerance(tables.models), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
 
 
-def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return the tolerance for single precision: ten times the effect of rounding all numbers; 0 if too large.
+def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> tuple[float, float]:
+    """Return the tolerance for single precision, ten times the effect of rounding all numbers, and the loss [um].
 
     Where a curve has steps, a reading close to a step may end up on its other side: therefore readings are also shifted
-    to either side, by the effect of rounding on the difference of two readings.
+    to either side, by the effect of rounding on the difference of two readings. The tolerance is 0 if it or the loss is
+    too large.
     """
     try:
         coarse = replace(compensator, models=round_all(compensator.models, round_single))
     except SettingError:  # a recurrence that is stable in double precision only
-        return 0.0
+        return 0.0, math.inf
 
-    def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
+    def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> tuple[float, float]:
         rows = readings._replace(values=_shifted(round_single(readings.values), way, np.float32))
         said = replay(coarse, tables, rows, rounded=rounded)
         if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
-            return math.inf
-        return _apart(answers, said)
+            return math.inf, math.inf
+        return _apart(answers, said), _loss(tables, answers, said)
 
-    found = max(1e-5, 10.0 * moved(0, round_single), 2.0 * moved(1), 2.0 * moved(-1))
-    return found if found <= _COARSE else 0.0
+    (rounding, *shifts), losses = zip(moved(0, round_single), moved(1), moved(-1), strict=True)
+    loss = max(losses)
+    found = max(1e-5, 10.0 * rounding, *(2.0 * s for s in shifts))
+    return found if found <= _TOLERANCE and loss <= _COARSE else 0.0, loss
+
+
+def _loss(tables: Tables, one: Answers, other: Answers) -> float:
+    """Return the largest difference of corrections at any position of the travel [um]."""
+    low, high, place = (np.array(tables.values[k]) for k in ("travel_low", "travel_high", "position"))
+    reach = np.maximum(np.abs(high - place), np.abs(low - place)) / 1000.0
+    apart = np.abs(one.correction - other.correction) + reach * np.abs(one.slope - other.slope)
+    return float(apart.max(initial=0.0))
 
 
 def _apart(one: Answers, other: Answers) -> float:

@@ -92,4 +92,5 @@ def _show(found: ExportedCode, files: list[str]) -> None:
         console.print(words(found.verdict), soft_wrap=True)
         for line in fold(f"Written: {', '.join(files)}", len(files), console.width):
             console.print(words(line), soft_wrap=True)
-        console.print(words(f"Verify it as described in {files[-1]}."), soft_wrap=True)
+        for line in (*found.notes, f"Verify it as described in {files[-1]}."):
+            console.print(words(line), soft_wrap=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from thermocomp.core.correction import Limits
 from thermocomp.export.checkscript import HEIDENHAIN, write_script
 from thermocomp.export.facts import Facts
-from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, in_um, mark, vectors
-from thermocomp.export.reduction.reducedpage import write_page
+from thermocomp.export.reduction.reduced import SHAPES, Reduced, head, in_mm, in_um, mark, to_ascii, vectors
+from thermocomp.export.reduction.reducedpage import name_table, write_page
 from thermocomp.export.target import Target
 
 SIGN = (
@@ -38,13 +38,15 @@ effect."""
 
 _INSTALL = """\
 1. Ask the machine builder which dimension of the kinematics table lies along the axis, and which PLC words contain
-   the temperatures {sensors}: this is **UNCONFIRMED**. The words must be in degC; if a word is in tenths of a degC,
+   the temperatures (table below): this is **UNCONFIRMED**. The words must be in degC; if a word is in tenths of a degC,
    `W<...>` is that word divided by 10. A resolution of 1 degC is too coarse: {step} um per degC.
 2. Make a note of the old line. Replace `<L>` by its dimension and `W<...>` by the words, and enter the formula.
 3. The sign of the dimension is **UNCONFIRMED**; to test it takes two minutes: with a dial indicator at the tool, add
    0.1 mm to the dimension only, and move the axis to the same position again. If the tool is 0.1 mm further in the
    **minus** direction of the axis, the formula is correct; if in the plus direction, reverse every sign after `<L>`.
 4. Set the datums again.
+
+{sensors}
 
 TNC 360: the PLC computes `word` of `{name}.txt`, rounds it to whole um, limits it to +-{most:g} um, and writes it
 every few seconds. Test the sign with +100 um: the axis must move by 0.1 mm in its plus direction."""
@@ -88,7 +90,7 @@ def write_heidenhain(
         "term. Let the PLC keep the last valid value.",
         install=_INSTALL.format(
             name=name,
-            sensors=", ".join(marks),
+            sensors=name_table("word", {f"`W<{m}>`": (m, name) for name, m in marks.items()}),
             step=f"{max(abs(f) for r in reductions for _, f in r.terms):.1f}",
             most=most,
         ),
@@ -97,9 +99,9 @@ def write_heidenhain(
         figure=figure,
     )
     texts = {
-        f"{name}.txt": "\n".join(lines) + "\n",
+        f"{name}.txt": to_ascii("\n".join(lines)) + "\n",
         f"{name}_vectors.csv": write_vectors(reductions, marks),
-        f"{name}_check.py": write_script(HEIDENHAIN, name),
+        f"{name}_check.py": write_script(HEIDENHAIN, name, "txt"),
         f"{name}.md": page,
     }
     return {file: text.encode() for file, text in texts.items()}

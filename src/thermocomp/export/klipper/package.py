@@ -123,7 +123,7 @@ def write_klipper(
     texts = {
         f"{name}.cfg": section,
         f"{name}_vectors.csv": _vectors(r, limits),
-        f"{name}_check.py": write_script(KLIPPER, name),
+        f"{name}_check.py": write_script(KLIPPER, name, "cfg"),
         f"{name}.md": page,
     }
     return {file: text.encode() for file, text in texts.items()}

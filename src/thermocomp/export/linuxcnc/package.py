@@ -49,7 +49,8 @@ Its exit code is 0 if all agree. Step 6 below verifies the rest at the machine.
    inputs, connect a `charge_pump` through `conv_bit_u32` to `reading`, and the inverted watchdog of the card to
    `good-K`.
 6. Start LinuxCNC, home, and check `halcmd show pin {hal}`: `rejected` must be 0 within a second of a reading, and
-   `engaged` TRUE when the machine is on, homed, and in MDI, AUTO or jogging of axes. Once a correction is not zero,
+   `engaged` TRUE when the machine is on, homed, and in MDI, AUTO or jogging of axes. While `status-K` is 5, nothing
+   moves: on a cold machine `halcmd setp {hal}.told-cold 1` (see below). Once a correction is not zero,
    {offsets} must have the same value, in machine units. **Test the sign**: with a dial indicator on the axis, the tool
    must move by the correction, in the plus direction if it is positive. `motion.eoffset-limited` is TRUE while a soft
    limit restricts the offset.

@@ -23,7 +23,8 @@ def translate(model: ErrorModel) -> Graph:
     Where `ErrorModel.step` rejects its arguments, the deviation is NaN and the state unchanged.
     """
     g, n = Graph(), len(model.inputs)
-    value, zero = g.enter("value", (n,)), g.enter("zero", (n,))
+    value = g.enter("value", (n,), about=", ".join(f"{i.name} [{i.unit}]" for i in model.inputs))
+    zero = g.enter("zero", (n,), about=tell_zeros(model))
     fixed = np.array([i.reference for i in model.inputs], dtype=np.float64)
     zero = g.choose(np.array([i.rezero for i in model.inputs], dtype=np.bool_), zero, fixed)
     change = g.put("Sub", g.between(value, -READING, READING), zero)
@@ -34,7 +35,10 @@ def translate(model: ErrorModel) -> Graph:
     good = g.every(*finite)
     begun, dt, kept = "", "", model.remembers or model.support.policy == "hold"
     if model.remembers:
-        begun, dt = g.put("Greater", g.pick("state", [0]), 0.5), g.enter("dt")
+        begun, dt = (
+            g.put("Greater", g.pick("state", [0]), 0.5),
+            g.enter("dt", about="time since the previous accepted call [s]"),
+        )
         timely = [g.put("GreaterOrEqual", dt, 0.0), g.put("LessOrEqual", dt, sys.float_info.max)]
         good = g.every(good, *timely)
         dt = g.choose(g.put("And", good, begun), g.put("Min", dt, GAP), 0.0)
@@ -42,12 +46,25 @@ def translate(model: ErrorModel) -> Graph:
     for node in model.remembered:
         walk.value(node)
     said = _support(g, model, change, inside, walk.value(model.expression(model.leaves)))
-    g.leave("deviation", g.choose(good, said, math.nan))
-    g.leave("outside", g.put("Not", inside), (n,), BOOL)
+    about = f"{model.target} [{model.unit}], actual minus commanded"
+    g.leave("deviation", g.choose(good, said, math.nan), about=about)
+    g.leave("outside", g.put("Not", inside), (n,), BOOL, "inputs outside the trained range")
     if kept:
-        g.enter("state", (walk.size,))
-        g.leave("next_state", g.choose(good, g.join([1.0, said, *walk.memory]), "state"), (walk.size,))
+        g.enter("state", (walk.size,), about="next_state of that call, zeros at the start")
+        g.leave(
+            "next_state",
+            g.choose(good, g.join([1.0, said, *walk.memory]), "state"),
+            (walk.size,),
+            about="state for the next call",
+        )
     return g
+
+
+def tell_zeros(model: ErrorModel) -> str:
+    """Return the zero (reference value) of each input, such as ``t1_C: mean at the start, t2_C: 20 degC``."""
+    return ", ".join(
+        f"{i.name}: {'mean at the start' if i.rezero else f'{i.reference:g} {i.unit}'}" for i in model.inputs
+    )
 
 
 def _support(g: Graph, model: ErrorModel, change: str, inside: str, said: str) -> str:

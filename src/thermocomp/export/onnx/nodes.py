@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 #: a value by its name, or as numbers
 Value = str | float | NDArray[Any]
-#: versions supported by runtimes since 2022
-OPSET, IR = 17, 8
+#: lowest versions that have all operators in this form (runtimes since 2021)
+OPSET, IR = 13, 7
 #: types of elements in `onnx.TensorProto`, without importing onnx
 DOUBLE, INT64, BOOL = 11, 7, 9
 
@@ -41,15 +41,15 @@ class Graph:
         """Return an unused name."""
         return f"v{next(self._free)}"
 
-    def enter(self, name: str, shape: Sequence[int] = (1,), kind: int = DOUBLE) -> str:
+    def enter(self, name: str, shape: Sequence[int] = (1,), kind: int = DOUBLE, about: str = "") -> str:
         """Return the name of a new input."""
-        self._inputs.append(self._onnx.make_tensor_value_info(name, kind, shape))
+        self._inputs.append(self._onnx.make_tensor_value_info(name, kind, shape, about))
         return name
 
-    def leave(self, name: str, value: str, shape: Sequence[int] = (1,), kind: int = DOUBLE) -> None:
+    def leave(self, name: str, value: str, shape: Sequence[int] = (1,), kind: int = DOUBLE, about: str = "") -> None:
         """Add an output with a given name and value."""
         self._nodes.append(self._onnx.make_node("Identity", [value], [name]))
-        self._outputs.append(self._onnx.make_tensor_value_info(name, kind, shape))
+        self._outputs.append(self._onnx.make_tensor_value_info(name, kind, shape, about))
 
     def constant(self, numbers: Value) -> str:
         """Return the name of a numeric constant; a scalar becomes a vector of one element."""

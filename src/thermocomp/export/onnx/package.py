@@ -6,7 +6,7 @@ import re
 from thermocomp.core.model import ErrorModel
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
-from thermocomp.export.onnx.graph import translate
+from thermocomp.export.onnx.graph import tell_zeros, translate
 from thermocomp.export.onnx.nodes import IR, OPSET
 from thermocomp.export.onnx.programs import RUN, TEST
 from thermocomp.export.onnx.vectors import write_vectors
@@ -23,7 +23,8 @@ _README = """{facts}
 
 # {name}: error models as ONNX
 
-Each graph is one model: opset {opset}, IR version {ir}, double precision, standard operators only. It subtracts the
+Each graph is one model: opset {opset} (the lowest that has all its operators in this form), IR version {ir}, double
+precision, standard operators only. It subtracts the
 zero from the readings, clips the changes to the trained range with its margin, evaluates the model, and applies its
 behaviour outside the trained range (`clip`, `hold` or `fade`).
 
@@ -62,8 +63,11 @@ fade; `thermocomp export --to c99` writes all of this in C.
 
 `deviation` is actual minus commanded; the correction is its negative. `outside` marks the inputs outside the trained
 range. If a value is not finite, or `dt` is negative, `deviation` is NaN and the state does not change. The state
-consists of a flag (1 after the first reading), the last deviation, and the memory. A model with a
-fixed interval makes at most 100,000 ticks in a call (17 days at 15 s).{axes}
+consists of a flag (1 after the first reading), the last deviation, and the memory. A model with a fixed interval makes
+at most 100,000 ticks in a call (17 days at 15 s).
+
+The metadata contain the verdict, `target`, `unit`, `inputs` (their names as a JSON list, in the order of `value`),
+`zeros`, model, version, limits and sign; inputs and outputs have descriptions.{axes}
 """
 
 _AXES = """
@@ -130,6 +134,10 @@ def _properties(model: ErrorModel, said: list[str], facts: Facts) -> dict[str, s
         "version": facts.version,
         "date": facts.date,
         **{key.lower().replace(" ", "_"): text for key, text in named.items()},
+        "target": model.target,
+        "unit": model.unit,
+        "inputs": json.dumps([i.name for i in model.inputs], ensure_ascii=False),
+        "zeros": tell_zeros(model),
         "value": ", ".join(f"{i.name} [{i.unit}]" for i in model.inputs),
         "deviation": f"{model.target} [{model.unit}]",
         "facts": "\n".join(said),

@@ -7,7 +7,7 @@ from thermocomp.core.exceptions import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class ReductionOptions:
-    """Reduction of a model to a form that klipper, heidenhain and fanuc support.
+    """Reduction of a model to a form that klipper, heidenhain, fanuc, haas and okuma support.
 
     Parameters
     ----------
@@ -22,6 +22,8 @@ class ReductionOptions:
         recordings.
     harm_margin : float
         Tolerated degradation in a single cycle [um]. Default: as in ``thermocomp fit``.
+    program : int
+        Program number of a macro, 1 to 9999; from 8000 on, programs are usually protected.
     jobs : int
         Number of parallel processes; -1: one per core.
     """
@@ -30,6 +32,7 @@ class ReductionOptions:
     axes: list[str] | None = None
     sensors: list[str] | None = None
     harm_margin: float | None = None
+    program: int = 7701
     jobs: int = -1
 
     def named(self) -> dict[str, str]:

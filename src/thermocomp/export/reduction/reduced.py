@@ -2,6 +2,7 @@
 
 import math
 import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
@@ -35,11 +36,11 @@ class Shape:
     axes: str
 
 
-#: by export target
+#: by export target; macro: of Fanuc, Haas and Okuma
 SHAPES = {
     "klipper": Shape(1, False, "Z"),
     "heidenhain": Shape(3, True, "XYZ"),
-    "fanuc": Shape(3, True, "XYZ"),
+    "macro": Shape(3, True, "XYZ"),
 }
 
 
@@ -245,9 +246,19 @@ def _plain(value: Decimal) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def to_ascii(text: str, other: str = ".") -> str:
+    """Return text in ASCII: letters without their accents, `other` for letters of other alphabets."""
+    apart = unicodedata.normalize("NFKD", text.replace("\u00df", "ss"))
+    bare = "".join(c for c in apart if c.isascii() or (c.isalnum() and not unicodedata.combining(c)))
+    return re.sub(r"[^\x00-\x7f]+", other, bare)
+
+
 def mark(name: str, taken: Sequence[str] = ()) -> str:
-    """Return a name of letters, digits and ``_`` only that differs from those in `taken`, ignoring case."""
-    found = re.sub(r"[^0-9A-Za-z_]", "_", name) or "_"
+    """Return a name of letters, digits and ``_`` only that differs from those in `taken`, ignoring case.
+
+    Letters of other alphabets become the number of the name, such as ``n2_C``.
+    """
+    found = re.sub(r"[^0-9A-Za-z_]", "_", to_ascii(name, f"n{len(taken) + 1}")) or "_"
     used = {t.upper() for t in taken}
     return found if found.upper() not in used else f"{found}_{len(taken)}"
 

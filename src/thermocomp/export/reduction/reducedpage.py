@@ -1,6 +1,6 @@
 """Page of an export to a simple controller: residual and loss, installation, check, and switching it off."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from thermocomp.export.reduction.reduced import Reduced, linear_factors
 
@@ -75,6 +75,12 @@ def write_page(
         check=check,
         off=off,
     )
+
+
+def name_table(place: str, names: Mapping[str, tuple[str, str]]) -> str:
+    """Return a table of the temperatures by place: name in the file, in ASCII, and in the recording."""
+    rows = [f"| {where} | {plain} | {name.replace('|', '/')} |" for where, (plain, name) in names.items()]
+    return "\n".join([f"| {place} | name in the file | name in the recording |", "|---|---|---|", *rows])
 
 
 def _errors(r: Reduced) -> Iterator[str]:
