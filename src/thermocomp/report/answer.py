@@ -1,9 +1,10 @@
 """Answer of a command, independent of its output: what to use, how good it is, what to do next."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from thermocomp.core.explained import Explanation
+from thermocomp.core.model import ErrorModel
 from thermocomp.report.layout import Layout, PrintedLine
 
 #: number of names listed before the others are only counted
@@ -54,6 +55,14 @@ def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
     if not any(s.watched for e in models for s in e.sensors):
         return [PrintedLine("Sensors are not monitored: a wrong value is not detected.")]
     return spares({s.name: f"{e.target}, {s.spare}" for e in models for s in e.sensors if s.spare})
+
+
+def noisy(models: Iterable[ErrorModel]) -> list[str]:
+    """Return warnings about models that may run and whose correction is noisy, the noisiest first."""
+    known = [
+        (h.scatter / (h.none_rms or 1.0), m.target, h.noisy) for m in models if m.accepted and (h := m.honest_error)
+    ]
+    return [f"{target}: {text}" for _, target, text in sorted(known, reverse=True) if text]
 
 
 def in_unit(target: str, unit: str) -> str:

@@ -12,7 +12,7 @@ from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import declared, summary
-from thermocomp.report.answer import CommandAnswer, in_unit, spares, spares_of
+from thermocomp.report.answer import CommandAnswer, in_unit, noisy, spares, spares_of
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 from thermocomp.report.running import describe_running
@@ -59,6 +59,7 @@ def fit(fitted: Fitted, files: Sequence[object], following: Sequence[str]) -> Co
                 for m in models
                 if m.honest_error is not None and not m.honest_error.word.startswith("accepted")
             ),
+            *noisy(models),
             *_cautions(told),
         ],
         files=files,
