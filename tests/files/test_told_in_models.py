@@ -24,8 +24,8 @@ def test_header_data_reach_the_model_explain_and_the_page(tmp_path: Path) -> Non
     assert model.provenance is not None
     assert model.provenance.tests == (test.stated(),)  # once for both
     assert f"Recorded with: {test}." in str(tc.explain(model)).splitlines()
-    page = tc.assess(model, small_machine((2200.0, 1200.0), seed=3, dt=200.0)).save(tmp_path / "page.html").read_text()
-    assert f"Models fitted to: {test}" in page
+    found = tc.assess(model, small_machine((2200.0, 1200.0), seed=3, dt=200.0))
+    assert f"Models fitted to: {test}" in found.report(tmp_path / "page.html").read_text("utf-8")
 
 
 def test_what_is_not_known_is_not_in_the_file(tmp_path: Path) -> None:
@@ -44,12 +44,12 @@ def test_a_noisy_correction_is_told_before_it_is_used(
     recordings.write(small_machine(dt=200.0), tmp_path / "drift.csv")
     run(f"fit drift.csv --target z_um --model ols --noise {noise} --jobs 1 -o model.json".split())
     fit = " ".join(capsys.readouterr().out.split())
-    run("export model.json --to c99 -o code".split())
+    run(["export", "model.json", "--to", "c99", "-o", "code"])
     export = capsys.readouterr().out
     (model,) = modelfile.read(tmp_path / "model.json")
     assert model.honest_error is not None
     assert model.accepted
-    # of a linear model without memory: noise times the root of the sum of the squared gains; judged without a cycle each
+    # of a linear model without memory: noise times the root of the sum of the squared gains (of models without a cycle)
     gains = list(model.coefficients_by_name().values())
     expected = noise * sum(g**2 for g in gains) ** 0.5
     assert model.honest_error.scatter == pytest.approx(expected, rel=0.25)

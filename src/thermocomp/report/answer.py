@@ -1,6 +1,6 @@
 """Answer of a command, independent of its output: what to use, how good it is, what to do next."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from thermocomp.core.explained import Explanation
@@ -65,6 +65,10 @@ def noisy(models: Iterable[ErrorModel]) -> list[str]:
     return [f"{target}: {text}" for _, target, text in sorted(known, reverse=True) if text]
 
 
-def in_unit(target: str, unit: str) -> str:
-    """Return the name of a target, with its unit unless that is um."""
-    return target if unit == "um" else f"{target} [{unit}]"
+def split_units(units: Iterable[str]) -> tuple[str, Callable[[str, str], str]]:
+    """Return the unit for the headings of a table, and a function of a target and its unit that names the target.
+
+    If the numbers have several units, the headings have none, and each target is named with its own.
+    """
+    several = len(found := {*units}) > 1
+    return "" if several else found.pop(), lambda target, unit: f"{target} [{unit}]" if several else target
