@@ -35,6 +35,9 @@ def check_size(text: str) -> list[str]:
         end = next(k for k in range(rule, len(lines)) if not lines[k])
         assert rule - begin <= 4, text
         assert 0 < end - rule - 1 <= ROWS, text
+        heading, first = " ".join(lines[begin:rule]), lines[rule + 1]
+        if re.search(r"RMS|instead|largest|range|gain|leans", heading):
+            assert re.search(r"\b(um|urad|unit)\b", heading) or re.search(r"\[(um|urad)\]", first), text
         del lines[begin:end]
     assert len([line for line in lines if line]) <= LINES, text
     _, _, following = "\n".join(lines).partition("\nNext:")

@@ -2,6 +2,8 @@
 
 import builtins
 import random
+import subprocess
+import sys
 import warnings
 import zlib
 from collections.abc import Callable
@@ -279,6 +281,20 @@ def test_damaged_files_are_refused_in_words(tmp_path: Path, name: str) -> None:
             told.append(str(e))
     assert len(told) >= 8
     assert all(str(path) in text for text in told)
+
+
+@pytest.mark.parametrize("ending", ["h5", "mat"])
+def test_a_heap_of_texts_without_an_end_is_refused_before_the_library_reads_it(tmp_path: Path, ending: str) -> None:
+    """HDF5 reads an object of no size again and again, and cannot be interrupted: hence in a process of its own."""
+    path = tmp_path / f"damaged.{ending}"
+    matrix(path)
+    whole = path.read_bytes()
+    heap = whole.index(b"GCOL")
+    told = "import sys, thermocomp as tc\ntry: tc.read(sys.argv[1])\nexcept tc.ThermocompError as e: print(e)"
+    for place, zeros in ((heap + 16, 16), (heap + 24 + 40 * 5, 64)):
+        path.write_bytes(whole[:place] + bytes(zeros) + whole[place + zeros :])
+        run = subprocess.run([sys.executable, "-c", told, path], timeout=60, check=True, capture_output=True, text=True)
+        assert f"{path}: the file is damaged (at byte" in run.stdout
 
 
 @pytest.mark.parametrize("ending", ["tdms", "h5", "mat"])

@@ -1,6 +1,6 @@
 """Results for notebooks: tables, figures, and short text."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from thermocomp.api.assessments import describe, draw_run, frame_of, residuals_of, starts_content
 from thermocomp.api.base import Paged, Result, told_trouble
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
@@ -16,53 +17,15 @@ from thermocomp.core.explained import Explanations, explain_all
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import find_faults
-from thermocomp.judging.results import Assessment, Comparison
+from thermocomp.judging.results import Comparison
 from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.recordings.starts import Start
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
-
-
-def starts_content(begins: Sequence[tuple[str, Start]]) -> list[dict[str, object]]:
-    """Return the initial thermal states of recordings for the JSON output."""
-    return [start.content(name) for name, start in begins]
-
-
-def frame_of(assessments: Sequence[Assessment]) -> pd.DataFrame:
-    """Return assessments as a table.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-
-    Returns
-    -------
-    DataFrame
-        A row per assessment; errors, half-widths of bands and measured values in um; nan where a model has no band.
-    """
-    return pd.DataFrame(
-        {
-            "target": [a.target for a in assessments],
-            "model": [str(a.model) for a in assessments],
-            "block": [a.block for a in assessments],
-            "rms": [a.metric("rms") for a in assessments],
-            "mae": [a.metric("mae") for a in assessments],
-            "max_abs": [a.metric("max_abs") for a in assessments],
-            "none_rms": [a.none_metric("rms") for a in assessments],
-            "reduction_pct": [a.metric("reduction") for a in assessments],
-            "coverage": [a.coverage for a in assessments],
-            "half_width": [a.half_width for a in assessments],
-            "sensors": [a.n_sensors[1] for a in assessments],
-            "verdict": [a.word for a in assessments],
-            "deployable": [a.deployable for a in assessments],
-            "reason": [a.reason for a in assessments],
-        }
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -163,7 +126,7 @@ class Compared(Result, Paged):
 
     def residuals(self) -> pd.DataFrame:
         """Return a row per unseen row of each target and model: measured, predicted, residual [unit of the target]."""
-        return _residuals(self.comparison.assessments, self.recordings)
+        return residuals_of(self.comparison.assessments, self.recordings)
 
     def plot(self, target: str | None = None, model: str | None = None) -> "Figure":
         """Return a figure of the errors of all models; or of a model over time, for a target, on the unseen blocks.
@@ -181,7 +144,7 @@ class Compared(Result, Paged):
 
         if target is None and model is None:
             return figures.overview(self.comparison).figure
-        return _run(self.comparison.assessments, self.recordings, target, model)
+        return draw_run(self.comparison.assessments, self.recordings, target, model)
 
     def page(self) -> str:
         """Return the page that ``thermocomp compare -o`` writes."""
@@ -293,16 +256,17 @@ class FittedModels(Result):
 
     def residuals(self) -> pd.DataFrame:
         """Return a row per unseen row of each target and model: measured, predicted, residual [unit of the target]."""
-        return _residuals(self.fitted.comparison.assessments, self.recordings)
+        return residuals_of(self.fitted.comparison.assessments, self.recordings)
 
     def plot(self, target: str | None = None) -> "Figure":
         """Return a figure of the method over time on the unseen blocks, for the first target or a given one."""
-        return _run(self.fitted.comparison.assessments, self.recordings, target or self.fitted.models[0].target, None)
+        first = self.fitted.models[0].target
+        return draw_run(self.fitted.comparison.assessments, self.recordings, target or first, None)
 
     def __str__(self) -> str:
         return " ".join(
             [
-                *(_judged(a) for a in self.fitted.comparison.overall()),
+                *(describe(a) for a in self.fitted.comparison.overall()),
                 *told_trouble(self.trouble),
             ]
         )
@@ -365,11 +329,11 @@ class Assessed(Result, Paged):
 
     def residuals(self) -> pd.DataFrame:
         """Return a row per judged row of each target and model: measured, predicted, residual [unit of the target]."""
-        return _residuals(self.judged.assessments, self.recordings)
+        return residuals_of(self.judged.assessments, self.recordings)
 
     def plot(self, target: str | None = None) -> "Figure":
         """Return a figure of the model over time on the recordings, for the first target or a given one."""
-        return _run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
+        return draw_run(self.judged.assessments, self.recordings, target or self.judged.models[0].target, None)
 
     def page(self) -> str:
         """Return the page that ``thermocomp assess -o`` writes."""
@@ -378,47 +342,4 @@ class Assessed(Result, Paged):
         return assessed.render(self.judged, self.recordings)
 
     def __str__(self) -> str:
-        return " ".join([*(_judged(a) for a in self.judged.overall()), *told_trouble(self.trouble)])
-
-
-def _residuals(assessments: Sequence[Assessment], recordings: Sequence[Recording]) -> pd.DataFrame:
-    """Return measured and predicted deviations of all judged rows, and the residuals."""
-    parts = [
-        pd.DataFrame(
-            {
-                "target": a.target,
-                "model": str(a.model),
-                "recording": [recordings[k].name for k in a.test.tolist()],
-                "time_s": [recordings[k].time[row] for k, row in zip(a.test.tolist(), a.row.tolist(), strict=True)],
-                "measured": a.measured,
-                "predicted": a.predicted,
-                "residual": a.measured - a.predicted,
-            }
-        )
-        for a in assessments
-        if a.overall and not a.failure
-    ]
-    return pd.concat(parts, ignore_index=True)
-
-
-def _judged(a: Assessment) -> str:
-    if a.failure:
-        return f"{a.target}: {a.reason}."
-    return (
-        f"{a.target}: {a.model} {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
-        f"({a.reason})."
-    )
-
-
-def _run(
-    assessments: Sequence[Assessment], recordings: Sequence[Recording], target: str | None, model: str | None
-) -> "Figure":
-    from thermocomp.report import figures
-
-    overall = [a for a in assessments if a.overall and (target, model) in ((a.target, None), (a.target, str(a.model)))]
-    if not overall:
-        known = ", ".join(dict.fromkeys(f"{a.model} for {a.target}" for a in assessments if a.overall))
-        raise InputError(f"there is no {model or 'model'} for {target}; there are {known}")
-    blocks = [a for a in assessments if (a.target, a.model) == (overall[0].target, overall[0].model) and not a.overall]
-    times = [r.time for r in recordings]
-    return figures.prediction(overall[0], blocks or overall, times).figure
+        return " ".join([*(describe(a) for a in self.judged.overall()), *told_trouble(self.trouble)])

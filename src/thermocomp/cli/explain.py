@@ -7,7 +7,7 @@ from thermocomp.cli.answers import free
 from thermocomp.cli.face import CommandFace, command
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.explained import Explanation, Explanations
-from thermocomp.report.answer import CommandAnswer, few, in_unit, spares_of
+from thermocomp.report.answer import CommandAnswer, few, spares_of, split_units
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 
 
@@ -55,7 +55,7 @@ def answer_models(
     return CommandAnswer(
         head=f"{number} of {' and '.join(what)} ({past}); {len(accepted)} may run. Leans on: largest contributions; "
         "if lost: worst sensor, RMS.",
-        table=Layout(_COLUMNS, models),
+        table=_table(models),
         lines=[*_failing(models), *spares_of(models)],
         warnings=[f"{e.target}: {e.word}, {e.reason}" for e in models if e.target not in accepted],
         files=files,
@@ -92,12 +92,15 @@ def _failing(models: Sequence[Explanation]) -> list[PrintedLine]:
     ]
 
 
-_COLUMNS = (
-    Column("target", lambda e: in_unit(e.target, e.unit)),
-    Column("method", lambda e: e.method or e.family),
-    Column("RMS", lambda e: e.rms, ".2f"),
-    Column("instead of", lambda e: e.none_rms, ".2f"),
-    Column("leans on", _leans),
-    Column("if lost", _worst_lost),
-    Column("verdict", lambda e: verdict(e.word)),
-)
+def _table(models: Sequence[Explanation]) -> Layout:
+    unit, name = split_units(e.unit for e in models)
+    columns = (
+        Column("target", lambda e: name(e.target, e.unit)),
+        Column("method", lambda e: e.method or e.family),
+        Column("RMS", lambda e: e.rms, ".2f", unit),
+        Column("instead of", lambda e: e.none_rms, ".2f", unit),
+        Column("leans on", _leans, unit=unit),
+        Column("if lost", _worst_lost, unit=unit),
+        Column("verdict", lambda e: verdict(e.word)),
+    )
+    return Layout(columns, models)

@@ -111,6 +111,8 @@ class Explanation:
         and number of these for which the correction continues.
     thresholds : tuple of Threshold
         Fixed numbers by which the compensator decides.
+    tests : tuple of str
+        Header data of the training recordings, as stated: machine, serial, place, date, operator, instrument.
     """
 
     target: str
@@ -132,6 +134,7 @@ class Explanation:
     judged_pairs: bool
     pairs: tuple[int, int]
     thresholds: tuple[Threshold, ...]
+    tests: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the explanation as plain numbers and text."""
@@ -208,6 +211,7 @@ def explain(model: ErrorModel) -> Explanation:
         judged_pairs=bool(judged),
         pairs=(len(pairs), sum(model.may_lose(pair) for pair in pairs)),
         thresholds=model.thresholds.rows,
+        tests=model.provenance.headers if model.provenance else (),
     )
 
 
@@ -301,6 +305,7 @@ def _lines(e: Explanation) -> list[str]:
         f"{e.target} [{e.unit}]: predicted by {e.method or e.family} from "
         f"{' and '.join([*what, *other]) or 'nothing'}; {past}.",
     ]
+    lines += [f"Recorded with: {test}." for test in e.tests]
     if any(s.bound is not None for s in e.sensors):
         each = ", ".join(f"{s.name} {s.bound:.1f}" for s in e.sensors if s.bound is not None)
         lines.append(f"Largest contribution of each input [{e.unit}]: {each}.")

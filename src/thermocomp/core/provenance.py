@@ -40,6 +40,8 @@ class Provenance:
         Initial state of each recording: cold, continued, rezeroed or known; in the order of `data_sha256`.
     clocks : tuple of str
         How the clocks of several loggers were brought together, for each recording made by ``thermocomp join``.
+    tests : tuple of dict of str to str
+        Header data of the recordings, as stated: machine, serial, place, date, operator, instrument; each once.
     """
 
     method: str
@@ -53,9 +55,15 @@ class Provenance:
     prints: Prints | None = field(default=None, repr=False)
     starts: tuple[str, ...] = ()
     clocks: tuple[str, ...] = ()
+    tests: tuple[dict[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         check_between("provenance", 0, COEFFICIENT, rows=self.rows)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        """Header data of the recordings as text."""
+        return tuple(", ".join(f"{name} {text}" for name, text in test.items()) for test in self.tests)
 
 
 #: version of the rules for verdicts; files without this number were judged by older rules
@@ -63,6 +71,8 @@ RULES = 2
 
 #: largest error without several inputs as a multiple of that predicted from the effects of each alone; see decision 30
 PREDICTED = 1.25
+#: a correction is noisy if noise of the readings moves it by more than this fraction of the drift
+NOISY = 0.1
 
 Word = Literal["accepted", "accepted for this duty", "unproven", "refused"]
 
@@ -104,6 +114,10 @@ class HonestError:
     lost : dict of str to float
         RMS of the residual when a sensor, or several of them (``t1_C, t2_C``, in the order of the inputs), reads its
         reference value from the start, with the watch (sensor monitoring) active [unit of the model].
+    noise : float
+        Standard deviation of the noise of the temperatures in use; 0: not known [degC].
+    scatter : float
+        RMS by which this noise moves the correction [unit of the model].
 
     Raises
     ------
@@ -126,6 +140,8 @@ class HonestError:
     taken: str = ""
     harm_margin: float | None = None
     lost: dict[str, float] = field(default_factory=dict)
+    noise: float = 0.0
+    scatter: float = 0.0
 
     def __post_init__(self) -> None:
         check_between(
@@ -143,6 +159,8 @@ class HonestError:
             rules=self.rules,
             harm_margin=self.harm_margin or 0.0,
             lost=list(self.lost.values()),
+            noise=self.noise,
+            scatter=self.scatter,
         )
 
     @property
@@ -166,6 +184,16 @@ class HonestError:
         other = "" if self.current or self.word != "unproven" else "older" if self.rules < RULES else "newer"
         why = f"judged by {other} rules: {self.reason}" if other else self.reason
         return f"{why}. Approved by {self.taken}" if self.taken else why
+
+    @property
+    def noisy(self) -> str:
+        """Warning that the correction is noisy in comparison with the drift; empty if it is not, or not known."""
+        if self.scatter <= NOISY * self.none_rms:
+            return ""
+        return (
+            f"noisy correction: noise of {self.noise:.2g} degC moves it by {self.scatter:.2g} RMS, drift "
+            f"{self.none_rms:.2g}: filter the readings, or use fewer sensors"
+        )
 
     def may_lose(self, names: Sequence[str], most: int = 1) -> bool:
         """Return whether the error without these inputs is judged, or predicted, to be below that without compensation.

@@ -127,8 +127,10 @@ def drop_unused(entry: dict[str, Any]) -> dict[str, Any]:
         del entry["band"]["widening"]
     if entry["validity"] and entry["validity"]["axes"] == "not recorded":
         del entry["validity"]["axes"]
-    if entry["provenance"] and not entry["provenance"]["clocks"]:
-        del entry["provenance"]["clocks"]
+    for part, names in (("provenance", ("clocks", "tests")), ("honest_error", ("noise", "scatter"))):
+        for name in names if entry[part] else ():
+            if not entry[part][name]:
+                del entry[part][name]
     return entry
 
 

@@ -78,7 +78,8 @@ def let_fail(watch: Watch, samples: Samples, rows: BoolArray) -> Guard:
         for k, failed in enumerate(cut):  # temperatures read their zero, speeds are missing once the zero is known
             values = np.where(failed & ~missing, zero, samples.values[mine][:, columns])
             values[failed & missing] = np.nan
-            found[k, mine], _ = run_watch(watch, samples.time[mine], values, samples.stands[mine], given)
+            passed, _ = run_watch(watch, samples.time[mine], values, samples.stands[mine], given)
+            found[k, mine] = np.where(np.isnan(passed), zero, passed)  # not replaced, such as a speed not yet explained
     changed = found != samples.values[:, columns]
     changed &= ~np.isnan(found)
     return Guard(

@@ -114,6 +114,7 @@ def fit(
         tested={*names} - {*given},
         support=support,
         covered=coverage.find_validity(samples, judging, recordings),
+        tests=tuple(t.stated() for t in dict.fromkeys(r.declared.test for r in recordings) if t.stated()),
     )
 
 
@@ -126,6 +127,7 @@ def _write(
     tested: Collection[str],
     support: Support,
     covered: Validity | None,
+    tests: tuple[dict[str, str], ...],
 ) -> Fitted:
     """Add to each model its error on unseen data and the watch; `tested`: targets whose methods were compared."""
     everything = np.ones(len(samples), dtype=np.bool_)
@@ -139,8 +141,9 @@ def _write(
     for overall, trained in zip(comparison.overall(), written, strict=True):
         model = replace(trained.model, support=support_of(overall, support))
         tried[overall.target] = overall if overall.target in done else stress_written(overall, model, samples, let)
-        honest = honest_error(tried[overall.target], comparison.judging)
-        models.append(replace(model, honest_error=honest, validity=covered, watch=watch))
+        honest = honest_error(tried[overall.target], comparison.judging, comparison.noise)
+        made = model.provenance and replace(model.provenance, tests=tests)
+        models.append(replace(model, honest_error=honest, validity=covered, watch=watch, provenance=made))
     judged = tuple(tried[a.target] if a.overall else a for a in comparison.assessments)
     return Fitted(
         tuple(models),
@@ -150,14 +153,15 @@ def _write(
     )
 
 
-def honest_error(overall: Assessment, judging: Judging) -> HonestError:
-    """Summarise an assessment for the model file."""
+def honest_error(overall: Assessment, judging: Judging, noise: float = 0.0) -> HonestError:
+    """Summarise an assessment for the model file; noise of the temperatures in use [degC], 0 if it is not known."""
     word, reason = overall.word, overall.reason
     if overall.failure or word == "not unseen":
         raise InputError(f"{overall.target} cannot be judged: {overall.failure or reason}")
     rms, none = overall.metric("rms"), overall.none_metric("rms")
     if accepted(word) and rms > none:  # one long cycle, within the margin, against many short ones
         word, reason = "unproven", f"{reason}; over all rows RMS {rms:.2f}, {none:.2f} without compensation"
+    used = overall.in_use(noise)
     return HonestError(
         protocol=judging.name,
         mae=overall.metric("mae"),
@@ -173,4 +177,6 @@ def honest_error(overall: Assessment, judging: Judging) -> HonestError:
         rules=RULES,
         harm_margin=overall.verdict.stated,
         lost={**tried.lost_rms, **tried.together_rms} if (tried := overall.robustness) else {},
+        noise=noise,
+        scatter=float(np.sqrt(max(used.noisy**2 - used.clean**2, 0.0))),
     )

@@ -1,9 +1,10 @@
 """Answer of a command, independent of its output: what to use, how good it is, what to do next."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from thermocomp.core.explained import Explanation
+from thermocomp.core.model import ErrorModel
 from thermocomp.report.layout import Layout, PrintedLine
 
 #: number of names listed before the others are only counted
@@ -56,6 +57,18 @@ def spares_of(models: Sequence[Explanation]) -> list[PrintedLine]:
     return spares({s.name: f"{e.target}, {s.spare}" for e in models for s in e.sensors if s.spare})
 
 
-def in_unit(target: str, unit: str) -> str:
-    """Return the name of a target, with its unit unless that is um."""
-    return target if unit == "um" else f"{target} [{unit}]"
+def noisy(models: Iterable[ErrorModel]) -> list[str]:
+    """Return warnings about models that may run and whose correction is noisy, the noisiest first."""
+    known = [
+        (h.scatter / (h.none_rms or 1.0), m.target, h.noisy) for m in models if m.accepted and (h := m.honest_error)
+    ]
+    return [f"{target}: {text}" for _, target, text in sorted(known, reverse=True) if text]
+
+
+def split_units(units: Iterable[str]) -> tuple[str, Callable[[str, str], str]]:
+    """Return the unit for the headings of a table, and a function of a target and its unit that names the target.
+
+    If the numbers have several units, the headings have none, and each target is named with its own.
+    """
+    several = len(found := {*units}) > 1
+    return "" if several else found.pop(), lambda target, unit: f"{target} [{unit}]" if several else target

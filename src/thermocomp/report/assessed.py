@@ -32,6 +32,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
         "assessed.html",
         **content
         | {
+            "headers": [*content["headers"], *_fitted_with(judged)],
             "verdict": "; ".join(_verdict(a, judged.stated) for a in overall) + ".",
             "good": all(a.accepted for a in overall),
             "predictions": draw_runs(seen, recordings),
@@ -56,6 +57,12 @@ def _fitted_badly(judged: Judged) -> Iterator[str]:
             yield f"{m.target}: never judged on unseen cycles when it was fitted; the model does not run."
         elif not m.accepted:
             yield f"{m.target}: {m.honest_error.word} when it was fitted: {m.honest_error.why}."
+
+
+def _fitted_with(judged: Judged) -> list[str]:
+    """Return the header data of the recordings to which the models were fitted, as lines of text."""
+    told = dict.fromkeys(text for m in judged.models if m.provenance for text in m.provenance.headers)
+    return [f"Models fitted to: {text}" for text in told]
 
 
 def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:

@@ -12,7 +12,7 @@ from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.study import Fitted
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import declared, summary
-from thermocomp.report.answer import CommandAnswer, in_unit, spares, spares_of
+from thermocomp.report.answer import CommandAnswer, noisy, spares, spares_of, split_units
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.report.layout import Column, Layout, PrintedLine, verdict
 from thermocomp.report.running import describe_running
@@ -59,6 +59,7 @@ def fit(fitted: Fitted, files: Sequence[object], following: Sequence[str]) -> Co
                 for m in models
                 if m.honest_error is not None and not m.honest_error.word.startswith("accepted")
             ),
+            *noisy(models),
             *_cautions(told),
         ],
         files=files,
@@ -138,14 +139,15 @@ def _results(
     rows: Sequence[Assessment], fitted: Mapping[str, float] | None = None, *, choosing: bool = False
 ) -> Layout:
     """Return the table of one model for each target; with `fitted` also the error when it was fitted."""
+    unit, name = split_units(a.verdict.unit for a in rows)
     columns = (
-        Column("target", lambda a: in_unit(a.target, a.verdict.unit)),
+        Column("target", lambda a: name(a.target, a.verdict.unit)),
         Column("method", lambda a: f"none yet ({a.model})" if choosing and not a.accepted else a.model),
         Column("inputs", lambda a: "-".join(map(str, dict.fromkeys(a.n_sensors))), ">"),
-        Column("RMS", lambda a: a.metric("rms"), ".2f"),
-        *([] if fitted is None else [Column("when fitted", lambda a: fitted.get(a.target), ".2f")]),
-        Column("instead of", lambda a: a.none_metric("rms"), ".2f"),
-        Column("largest", lambda a: a.metric("max_abs"), ".2f"),
+        Column("RMS", lambda a: a.metric("rms"), ".2f", unit),
+        *([] if fitted is None else [Column("when fitted", lambda a: fitted.get(a.target), ".2f", unit)]),
+        Column("instead of", lambda a: a.none_metric("rms"), ".2f", unit),
+        Column("largest", lambda a: a.metric("max_abs"), ".2f", unit),
         Column("verdict", lambda a: verdict(a.word)),
     )
     return Layout(columns, rows)
@@ -195,5 +197,5 @@ def _selected(choices: Sequence[Choice]) -> Layout:
     found = (errors[model, best[1]], errors[model, -1], budget.none_of_targets())
     rows = [(target, *map(float, mine), best[0]) for target, *mine in zip(budget.targets, *found, strict=True)]
     headings = (f"RMS with {budget.sizes[best[1]]}", f"with all {budget.sizes[-1]}", "instead of")
-    numbers = (Column(heading, k, ".2f") for k, heading in enumerate(headings, start=1))
+    numbers = (Column(heading, k, ".2f", "um") for k, heading in enumerate(headings, start=1))
     return Layout((Column("target", 0), *numbers, Column("method", 4)), rows)

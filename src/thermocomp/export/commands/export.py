@@ -14,8 +14,11 @@ from thermocomp.cli.options import CompensatorOptions
 from thermocomp.cli.terminal import console, words
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.model import ErrorModel
 from thermocomp.export.reduction.options import ReductionOptions
 from thermocomp.export.verbs import ExportedCode
+from thermocomp.files.machines import read_models
+from thermocomp.report.answer import noisy
 
 
 @Parameter(name="*")
@@ -79,15 +82,17 @@ def export(found: ExportedCode, face: CommandFace) -> int:
     """
     face.write(found.save)
     files = [str(face.output / file) for file in found.files] if face.output is not None else []
-    face.show(lambda: {**found.to_dict(), "files": files}, partial(_show, found, files))
+    face.show(lambda: {**found.to_dict(), "files": files}, partial(_show, found, files, face.given["model"]))
     return 1 if found.refused else 0
 
 
-def _show(found: ExportedCode, files: list[str]) -> None:
+def _show(found: ExportedCode, files: list[str], model: Path) -> None:
     for target, why in found.refused.items():
         console.print(f"[red]refused[/] {words(f'{target} is left out: {why}')}", soft_wrap=True)
     for target, why in found.elsewhere.items():
         console.print(words(f"{target} is left out: {why}"), soft_wrap=True)
+    for text in noisy(m for m in read_models(model) if isinstance(m, ErrorModel) and files)[:1]:
+        console.print(words(f"Warning: {text}"), soft_wrap=True)
     if files:
         console.print(words(found.verdict), soft_wrap=True)
         for line in fold(f"Written: {', '.join(files)}", len(files), console.width):

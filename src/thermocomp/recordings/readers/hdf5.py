@@ -1,7 +1,9 @@
 """HDF5 files, read by h5py: the datasets of a group, the columns of a matrix, or the fields of a compound dataset."""
 
+import struct
 from collections.abc import Iterator, Sequence
 from functools import partial
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +31,8 @@ _UNITS = ("unit_string", "units", "unit", "Units", "Unit")
 _NAMES = ("columns", "column_names", "names", "channels", "channel_names", "labels")
 #: texts in memory at the same time [byte]
 _TEXTS = 64 << 20
+#: start of a global heap (HDF5 File Format Specification 3.0, III.E), version 1; head of an object: number, size [byte]
+_HEAP, _OBJECT = b"GCOL\x01\0\0\0", struct.Struct("<H6xQ")
 
 
 def open_hdf5(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTable:
@@ -36,6 +40,7 @@ def open_hdf5(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTabl
     with translated(path, "an HDF5 file", "h5py"):
         from h5py import Dataset, File
 
+        check_heaps(path)
         with File(path, "r", locking=False) as file:
             found: list[Dataset] = []
 
@@ -139,6 +144,26 @@ def _load_texts(dataset: "Dataset", path: Path, limits: FileLimits) -> NDArray[A
         limits.check_unpacked(size, path)
         found.extend(texts)
     return np.array(found, dtype=object)
+
+
+def check_heaps(path: Path) -> None:
+    """Reject a file with an object of a global heap that takes no space: the library would read it over and over.
+
+    The texts of any length are in these heaps. The library cannot be interrupted from Python while it reads one.
+    """
+    with path.open("rb") as f, mmap(f.fileno(), 0, access=ACCESS_READ) as data:
+        at = data.find(_HEAP)
+        while at >= 0:
+            here = at + len(_HEAP) + 8
+            end = min(at + int.from_bytes(data[here - 8 : here], "little"), len(data)) - _OBJECT.size
+            while here <= end:
+                number, size = _OBJECT.unpack_from(data, here)
+                # the size of free space (number 0) includes its head; the library adds with 64 bits
+                taken = (_OBJECT.size + (size + 7) // 8 * 8) % 2**64 if number else size
+                if not taken:
+                    raise RecordingError(f"{path}: the file is damaged (at byte {here}); export it again")
+                here += taken
+            at = data.find(_HEAP, at + 1)
 
 
 def check_references(file: "File", path: Path, limits: FileLimits) -> None:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.readers.hdf5 import check_references
+from thermocomp.recordings.readers.hdf5 import check_heaps, check_references
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import FrameTable
@@ -30,6 +30,7 @@ def open_matlab(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTa
         import h5py
 
         if h5py.is_hdf5(path):
+            check_heaps(path)
             with h5py.File(path, "r", locking=False) as file:
                 check_references(file, path, limits)
         else:
