@@ -5,7 +5,7 @@ const KINDS = { temperature: "temperature", displacement: "deviation or displace
 const UNITS = { temperature: ["degC", "degF", "K"], displacement: ["um", "mm", "in", "nm"], spindle_speed: ["1/min", "Hz"], position: ["mm", "um", "in"], angle: ["urad", "deg"], feed: ["mm/min"] };
 const METHODS = ["ols", "partial-f", "mra", "dynamic", "averaged", "grouping", "subsets", "ace", "ace-monotone", "mlp", "ridge", "pcr", "pls", "lasso", "ppr"], USUAL = 5;
 const UNIT = { cycle: "thermal cycles", day: "days", file: "files" };
-const TARGETS = { c99: "C99 (DSP, PLC, computer)", st: "structured text, CODESYS", "st twincat": "structured text, TwinCAT", "st scl": "structured text, Siemens TIA", "st iec": "structured text, IEC 61131-3 second edition", siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", klipper: "Klipper", onnx: "ONNX" };
+const TARGETS = { c99: "C99 (DSP, PLC, computer)", st: "structured text, CODESYS", "st twincat": "structured text, TwinCAT", "st scl": "structured text, Siemens TIA", "st iec": "structured text, IEC 61131-3 second edition", siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", haas: "Haas", okuma: "Okuma", klipper: "Klipper", onnx: "ONNX" };
 let state = null, seen = {}, drawn = 0, shownRun = "", figures = 0;
 
 function alarm(text = "") { $("alarm").textContent = text; $("alarm").hidden = !text; if (text) $("alarm").scrollIntoView({ block: "nearest" }); }
