@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from thermocomp.export.c99.cstatements import write_functions, write_tables, write_variables
+from thermocomp.export.c99.cstatements import comment, write_functions, write_tables, write_variables
 from thermocomp.runtime.program.tables import Tables
 
 _HEADER = """{facts}#ifndef {guard}
@@ -267,9 +267,10 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
 
 def _wrapped(line: str) -> str:
     """Return a long line as several: C compilers need not accept more than 4,095 characters."""
-    if len(line) <= 200:
+    if len(line) <= 120:
         return line
-    return textwrap.fill(line, 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) + "\n"
+    indent = line[: len(line) - len(line.lstrip())] + "    "
+    return textwrap.fill(line, 116, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
@@ -286,10 +287,3 @@ def identifier(name: str) -> str:
     """Return a valid C identifier close to a name."""
     text = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     return f"tc_{text}"
-
-
-def comment(text: str) -> str:
-    """Return a text in which nothing ends a C comment."""
-    for sign in ("*/", "/*", "??"):
-        text = text.replace(sign, " ".join(sign))
-    return " ".join(text.split())

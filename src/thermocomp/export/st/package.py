@@ -10,8 +10,8 @@ from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
-from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
-from thermocomp.export.st.ststatements import BAGS, Dialect
+from thermocomp.export.st.structuredtext import SourceUnit, translate
+from thermocomp.export.st.ststatements import BAGS, Dialect, comment
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay

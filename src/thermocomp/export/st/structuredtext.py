@@ -10,6 +10,7 @@ from thermocomp.export.st.ststatements import (
     TYPES,
     Dialect,
     array,
+    comment,
     number,
     quoted,
     safe,
@@ -249,10 +250,3 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
 
 def _listed(names: Sequence[str]) -> str:
     return "; ".join(f"{k}: {n}" for k, n in enumerate(names))
-
-
-def comment(text: str) -> str:
-    """Return a text in which nothing ends a comment of structured text."""
-    for sign in ("*)", "(*", "]]>"):
-        text = text.replace(sign, " ".join(sign))
-    return " ".join(text.split())

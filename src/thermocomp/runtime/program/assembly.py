@@ -45,6 +45,14 @@ def used_locals(function: Function) -> dict[str, Kind]:
     return {name: function.locals[name] for name in names if name in function.locals}
 
 
+def grouped_locals(function: Function, types: Mapping[Kind, str]) -> dict[str, list[str]]:
+    """Return the names of the local variables that the statements of a function use, by their type, sorted."""
+    found: dict[str, list[str]] = {}
+    for name, kind in sorted(used_locals(function).items()):
+        found.setdefault(types[kind], []).append(name)
+    return found
+
+
 def _decided(body: list[Statement], sizes: Mapping[str, int]) -> list[Statement]:
     """Return statements without branches and loops that a compensator does not use."""
     found: list[Statement] = []

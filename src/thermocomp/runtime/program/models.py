@@ -1,7 +1,7 @@
 """Formulas of models as functions of a program: one variable per node, with lags and ticks in the state."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from operator import add, mul
 from typing import Any
@@ -10,6 +10,7 @@ from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.recurrences import Clock
+from thermocomp.runtime.program.banks import Bank, join, stripped
 from thermocomp.runtime.program.clocks import run_clock
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
@@ -35,38 +36,36 @@ class Formulas:
         Inputs of the models, without duplicates.
     channels : sequence of int
         Index of each input among the values of a reading.
+    groups : mapping of str to sequence of (int, ErrorModel)
+        Index and model of the outputs of each function; ``models_`` is prefixed to its name.
     """
 
-    def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
+    def __init__(
+        self, ranges: Sequence[Input], channels: Sequence[int], groups: Mapping[str, Sequence[tuple[int, ErrorModel]]]
+    ) -> None:
         self.channels = channels
         self._supports = Supports(ranges)
-        self.lags = 0
+        self.nodes = {k: formula(m, tuple(ranges)) for models in groups.values() for k, m in models}
+        self.banks = list[Bank]()
+        for models in groups.values():
+            self.banks.append(Bank([self.nodes[k] for k, _ in models], self.banks))
+        self.lags = sum(len(b.lags) for b in self.banks)
         self.clocks: list[_Clock] = []
         self.x, self.y = list[float](), list[float]()
         self.functions: dict[str, Function] = {}  #: by name
+        for (name, models), bank in zip(groups.items(), self.banks, strict=True):
+            self._add(name, models, bank)
 
-    def add(self, name: str, models: Iterable[tuple[int, ErrorModel, e.Node]]) -> None:
-        """Record a function that computes the outputs of models.
-
-        Parameters
-        ----------
-        name : str
-            Name of the function; ``models_`` is prefixed.
-        models : iterable of (int, ErrorModel, Node)
-            Index, model and formula; the inputs of a formula are numbered like the ranges.
-        """
+    def _add(self, name: str, models: Iterable[tuple[int, ErrorModel]], bank: Bank) -> None:
+        """Record the function that computes the outputs of models."""
         s = Kept()
+        begun = s.begun_absolute if name == "absolute" else s.begun_rezeroed
         with record(f"models_{name}") as self.functions[f"models_{name}"]:
-            formula, worked_out = (
-                _Formula(self, s.begun_absolute if name == "absolute" else s.begun_rezeroed),
-                set[int](),
-            )
-            for place, model, node in models:
-                self._supports.record(model, place, formula.value(node), worked_out)
-            if name == "absolute":
-                s.begun_absolute = True
-            else:
-                s.begun_rezeroed = True
+            values, worked_out = _Formula(self, bank, begun), set[int]()
+            bank.record(begun, values.store)
+            for place, model in models:
+                self._supports.record(model, place, values.value(self.nodes[place]), worked_out)
+            begun.set(True)
 
     def finish(self) -> tuple[dict[str, int], dict[str, list[Any]]]:
         """Record the last function; return all sizes and numbers that the functions need."""
@@ -77,7 +76,8 @@ class Formulas:
                     w.next = _Ticking(clock).value(clock.tick)
         sizes, values = self._supports.finish()
         clocks = self.clocks
-        sizes |= {
+        own_sizes, own_values = join(self.banks)
+        sizes |= own_sizes | {
             "LAGS": self.lags,
             "CLOCKS": len(clocks),
             "ENDS_OF_CLOCKS": len(clocks) + 1,
@@ -86,7 +86,7 @@ class Formulas:
             "AVERAGES": sum(c.means * len(c.leaves) for c in clocks),
             "POINTS_OF_TABLES": len(self.x),
         }
-        values |= {
+        values |= own_values | {
             "interval": [c.interval for c in clocks],
             "past_begin": [c.past_begin for c in clocks] + [sizes["PASTS"]],
             "leaf_begin": [c.leaf_begin for c in clocks] + [sizes["LEAVES"]],
@@ -95,6 +95,13 @@ class Formulas:
             "table_y": self.y,
         }
         return sizes, values
+
+
+def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> e.Node:
+    """Return the formula of a model, with its inputs numbered like the ranges."""
+    low, high, _ = model.bounds
+    leaves = (e.Input(ranges.index(i), i.name) for i in model.inputs)
+    return model.expression([e.Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
 
 
 def name_value(node: e.Node) -> str:
@@ -131,8 +138,7 @@ class _Arithmetic:
 
     def value(self, node: e.Node) -> Number:
         """Return the value of an expression's node, computed once."""
-        if isinstance(node, e.Named):
-            return self.value(node.of)
+        node = stripped(node)
         if isinstance(node, e.Constant):
             return real(node.value)
         if (known := self._known.get(node)) is None:
@@ -174,10 +180,20 @@ class _Arithmetic:
 class _Formula(_Arithmetic):
     """Formula of models, with lags, tables and values updated at fixed intervals."""
 
-    def __init__(self, formulas: Formulas, begun: Condition) -> None:
+    def __init__(self, formulas: Formulas, bank: Bank, begun: Condition) -> None:
         super().__init__()
-        self._formulas, self._begun = formulas, begun
+        self._formulas, self._bank, self._begun = formulas, bank, begun
+        w = Work()
+        self._known |= {n: w.term[bank.places[n]] for n in (*bank.inputs, *bank.lags)}
+        self._known |= {n: w.total[k] for n, k in zip(bank.sums, bank.rows["sums"], strict=True)}
         self._gains: dict[Expression, Number] = {}
+
+    def store(self, nodes: Iterable[e.Node]) -> None:
+        """Record the values of nodes as terms of the bank."""
+        for node in nodes:
+            term = Work().term[self._bank.places[node]]
+            term.set(self.value(node) if node in self._known or isinstance(node, e.Constant) else self._found(node))
+            self._known[node] = term
 
     def _found(self, node: e.Node) -> Number:
         own, s, w, t = self._formulas, Kept(), Work(), Constants()

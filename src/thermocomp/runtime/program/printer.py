@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.declarations import Var
 from thermocomp.runtime.program.tree import Expression, Function, Kind, Operator, Statement
 
 #: operators of equal precedence: evaluated from left to right, they need no parentheses
@@ -105,3 +106,17 @@ class Printer(ABC):
 def written(value: Any, one: Callable[[float], str]) -> list[str]:
     """Return the numbers of a table as text, row by row."""
     return [text for v in value for text in written(v, one)] if isinstance(value, list) else [one(value)]
+
+
+def label_columns(var: Var, labels: Mapping[str, Sequence[str]]) -> str:
+    """Return a comment on the columns of a table of rows; empty if it has none, or only one."""
+    names = labels.get(var.dims[-1], ()) if len(var.dims) > 1 else ()
+    return f"; columns: {', '.join(names)}" if len(names) > 1 else ""
+
+
+def label_rows(found: list[Any], dims: Sequence[str], labels: Mapping[str, Sequence[str]]) -> list[tuple[str, Any]]:
+    """Return the rows of a table, or its values if it has a single dimension, with their labels."""
+    rows = list(zip(labels.get(dims[0], [""] * len(found)), found, strict=True))
+    if len(dims) < 3:
+        return rows
+    return [(f"{name}, {own}", row) for name, table in rows for own, row in label_rows(table, dims[1:], labels)]

@@ -8,8 +8,6 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Clip, Node
-from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.starting import find_start_span
@@ -17,6 +15,7 @@ from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import find_cold_after
+from thermocomp.runtime.program.labels import Labels, label_banks, label_inputs, label_watch
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
 from thermocomp.runtime.program.variables import Kept
@@ -84,6 +83,7 @@ class Tables(NamedTuple):
         str, Any
     ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Constants`
     formulas: dict[str, Function]  #: functions generated from the models' formulas
+    labels: Labels  #: of the rows and columns of the values, by the name of their size
 
 
 def gather(compensator: Compensator) -> Tables:
@@ -128,10 +128,11 @@ def gather(compensator: Compensator) -> Tables:
         **_judged(models, sensors),
         **_watch(watch, place),
     }
-    formulas = Formulas(ranges, values["channel"])
-    for name, waits in (("absolute", False), ("rezeroed", True)):
-        mine = [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
-        formulas.add(name, [(k, m, formula(m, ranges)) for k, m in mine])
+    groups = {
+        name: [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
+        for name, waits in (("absolute", False), ("rezeroed", True))
+    }
+    formulas = Formulas(ranges, values["channel"], groups)
     own_sizes, own_values = formulas.finish()
     values |= own_values
     sizes = {
@@ -156,6 +157,17 @@ def gather(compensator: Compensator) -> Tables:
         sizes=sizes,
         values=values | {"fingerprint": _fingerprint(values, formulas.functions)},
         formulas=formulas.functions,
+        labels={
+            "CHANNELS": label_inputs(channels),
+            "RANGES": label_inputs(ranges),
+            "FED": label_inputs([channels[k] for k in values["feed_channel"]]),
+            "MEMBERS": label_inputs([ranges[k] for k in values["set_range"]]),
+            "SUPPORTED": label_inputs([ranges[k] for k in values["member_range"]]),
+            "MODELS": [m.target for m in models],
+            "TARGETS": [f"{target} [um]" for target in lines],
+            **label_banks(formulas.banks, ranges, models, formulas.nodes),
+            **label_watch(watch),
+        },
     )
 
 
@@ -187,13 +199,6 @@ def _sizes(values: dict[str, Any]) -> dict[str, int]:
         "has_zero": int(any(values["model_rezeroed"])),
         "has_absolute": int(not all(values["model_rezeroed"])),
     }
-
-
-def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
-    """Return the formula of a model, with its inputs numbered like the ranges."""
-    low, high, _ = model.bounds
-    leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)
-    return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
 
 
 def _ranges(
