@@ -11,7 +11,7 @@ from thermocomp.core.bounds import round_single, round_within
 from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.assembly import functions, grouped_locals
 from thermocomp.runtime.program.declarations import Var
-from thermocomp.runtime.program.printer import Printer, label_columns, label_rows
+from thermocomp.runtime.program.printer import Printer, compact, label_columns, label_rows
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS
@@ -41,7 +41,7 @@ class _Writer(Printer):
             head += f"tc_real tc_{f.name}({', '.join(rest)})"
         else:
             head += f"void tc_{f.name}({', '.join([f'{self._state}_state *s', f'{self._state}_work *w', *rest])})"
-        lines = self.block(f.body, 1)
+        lines = compact(self.block(f.body, 1), r"(if|for|while) \(.*\{", r"\} else \{", r"\}")
         text = "\n".join(lines)
         declared = [f"    {kind} {', '.join(names)};" for kind, names in grouped_locals(f, TYPES).items()]
         passed = [] if f.is_of_numbers or "(s, w" in text else [v for v in "sw" if f"{v}->" not in text]

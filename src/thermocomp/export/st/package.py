@@ -182,9 +182,11 @@ def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:
 
 def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
     """Return the name and the text of a TwinCAT 3 file for a block or type."""
-    body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
+    body = (
+        f"\n    <Implementation><ST><![CDATA[{chr(10).join(unit.body())}\n]]></ST></Implementation>" if unit.end else ""
+    )
     kind = "POU" if unit.end else "DUT"
-    first, rest = unit.declaration.split("\n", 1)
+    first, rest = unit.head().split("\n", 1)
     text = _OBJECT.format(
         kind=kind,
         name=unit.name,

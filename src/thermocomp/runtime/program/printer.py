@@ -1,5 +1,6 @@
 """Translation of a compensator's program to another language: the part common to all languages."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
@@ -8,6 +9,8 @@ from thermocomp.runtime.program import tree as n
 from thermocomp.runtime.program.declarations import Var
 from thermocomp.runtime.program.tree import Expression, Function, Kind, Operator, Statement
 
+#: longest line of a branch or loop of one statement [characters]
+_SHORT = 110
 #: operators of equal precedence: evaluated from left to right, they need no parentheses
 _RANKS: tuple[set[Operator], ...] = ({"+", "-"}, {"*", "/"}, {"and"}, {"or"})
 
@@ -106,6 +109,34 @@ class Printer(ABC):
 def written(value: Any, one: Callable[[float], str]) -> list[str]:
     """Return the numbers of a table as text, row by row."""
     return [text for v in value for text in written(v, one)] if isinstance(value, list) else [one(value)]
+
+
+def compact(lines: Sequence[str], begin: str, other: str, end: str) -> list[str]:
+    """Return lines with branches and loops of one short statement on one line: only spaces differ.
+
+    Parameters
+    ----------
+    begin, other, end : str
+        Regular expressions of the first line of a branch or loop, of its ``else`` and of its last line.
+    """
+    found = list[str]()
+    for line in lines:
+        found.append(line)
+        for count, inner in ((5, (begin, "", other, "", end)), (3, (begin, "", end))):
+            last = found[-count:]
+            pad = last[0][: len(last[0]) - len(last[0].lstrip())]
+            text = pad + " ".join(x.strip() for x in last)
+            if (
+                len(last) == count
+                and len(text) <= _SHORT
+                and all(
+                    re.fullmatch(pad + (pattern or rf"    (?!{begin})[^{{}}]*;"), x)
+                    for pattern, x in zip(inner, last, strict=True)
+                )
+            ):
+                found[-count:] = [text]
+                break
+    return found
 
 
 def label_columns(var: Var, labels: Mapping[str, Sequence[str]]) -> str:
