@@ -231,16 +231,23 @@ class Sources:
     source: str
 
 
-def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_only: bool = False) -> Sources:
+def translate(
+    tables: Tables, name: str, facts: Sequence[str] = (), told: Sequence[str] = (), *, double_only: bool = False
+) -> Sources:
     """Return a compensator in C99.
 
     The code processes values as `Compensator.step` processes a reading.
+
+    Parameters
+    ----------
+    facts, told : sequence of str
+        Comments above both files, and above the source.
     """
     name, n, sizes = identifier(name), len(tables.channels), tables.sizes
     functions = write_functions(tables, name)
     above = "".join(f"/* {comment(line)} */\n" for line in facts)
     source = _SOURCE.format(
-        facts=above,
+        facts=above + "".join(f"/* {comment(line)} */\n" for line in told),
         name=name,
         n=n,
         work=write_variables(sizes, "w", functions + "w->value w->age w->dt w->counter"),

@@ -7,11 +7,11 @@ from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
-from thermocomp.export.pages import describe
+from thermocomp.export.pages import describe, explain
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, translate
-from thermocomp.export.st.ststatements import BAGS, Dialect, comment
+from thermocomp.export.st.ststatements import BAGS, Dialect, comment, wrapped
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay
@@ -138,7 +138,14 @@ def write_blocks(
     answers = replay(compensator, tables, readings)
     units = [*translate(tables, name, dialect), *more]
     tests = write_test(tables, name, dialect, readings, answers)
-    head = "".join(f"(* {comment(line)} *)\n" for line in said)
+    more_said = explain(
+        compensator,
+        tables,
+        kept="kept, and off_time above 0",
+        cold="cold, or a rising edge of restart",
+        off="age := 1.0E+9",
+    )
+    head, told = ("".join(wrapped(f"(* {comment(x)} *)") + "\n" for x in lines) for lines in (said, more_said))
     page = _README.format(
         facts="  \n".join(said),
         name=name,
@@ -152,7 +159,7 @@ def write_blocks(
         **describe(compensator, tables),
     )
     if dialect == "twincat":
-        files = dict(_object(unit, head) for unit in [*units, *tests])
+        files = dict(_object(unit, head + told * (unit.name == name)) for unit in [*units, *tests])
     else:
         suffix = "scl" if dialect == "scl" else "st"
         files = {}
@@ -164,7 +171,7 @@ def write_blocks(
                 tests = [u for u in plain if u.name.startswith(tuple(names))]
                 units = [u for u in plain if u not in tests]
         files |= {
-            f"{name}.{suffix}": _joined(units, head, dialect),
+            f"{name}.{suffix}": _joined(units, head + told, dialect),
             f"{name}_test.{suffix}": _joined(tests, head, dialect),
         }
     return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}

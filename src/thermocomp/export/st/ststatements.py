@@ -202,7 +202,7 @@ def comment(text: str) -> str:
     """Return a text in which nothing ends a comment of structured text."""
     for sign in ("*)", "(*", "]]>"):
         text = text.replace(sign, " ".join(sign))
-    return " ".join(text.replace(";", ",").split())
+    return " ".join(text.split())
 
 
 def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect) -> str:
@@ -211,7 +211,7 @@ def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect)
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
     lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
-    labels = {dim: [comment(name) for name in names] for dim, names in tables.labels.items()}
+    labels = {dim: [comment(name).replace(";", ",") for name in names] for dim, names in tables.labels.items()}
     for name_, var in used_in(bag, used).items():
         size = size_of(var, tables.sizes)
         text = f"    {safe(name_)} : {array(var.kind, size) if var.dims else TYPES[var.kind]}"

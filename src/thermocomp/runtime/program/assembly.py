@@ -46,9 +46,9 @@ def used_locals(function: Function) -> dict[str, Kind]:
 
 
 def grouped_locals(function: Function, types: Mapping[Kind, str]) -> dict[str, list[str]]:
-    """Return the names of the local variables that the statements of a function use, by their type, sorted."""
+    """Return the names of the local variables that the statements of a function use, by their type."""
     found: dict[str, list[str]] = {}
-    for name, kind in sorted(used_locals(function).items()):
+    for name, kind in used_locals(function).items():
         found.setdefault(types[kind], []).append(name)
     return found
 

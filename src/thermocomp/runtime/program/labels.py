@@ -25,6 +25,8 @@ def label_node(node: e.Node, ranges: Sequence[Input]) -> str:
             return f"{label_node(stripped(of), ranges)}, lag {tau:.5g} s"
         case e.PacedLag(of, stopped, running):
             return f"{label_node(stripped(of), ranges)}, lag {stopped:.5g} s at rest, {running:.5g} s at top speed"
+        case e.Power(of, exponent):
+            return f"({label_node(stripped(of), ranges)})^{exponent:.4g}"
     return e.format_node(node)
 
 

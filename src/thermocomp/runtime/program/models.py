@@ -146,6 +146,13 @@ class _Arithmetic:
             known = self._known[node] = let(self._new_name(node), found)
         return known
 
+    def _term(self, node: e.Node) -> Number:
+        """Return the value of a term of a sum; a weighted value has no variable of its own."""
+        match stripped(node):
+            case e.Product((e.Constant(weight), of)):
+                return weight * self.value(of)
+        return self.value(node)
+
     def _new_name(self, node: e.Node) -> str:
         """Return a new name of a variable: that of the sensor and the operation if there is one, otherwise a number."""
         number = len(self._known)
@@ -161,7 +168,7 @@ class _Arithmetic:
             case e.Clip(of, low, high):
                 return clip(self.value(of), real(low), real(high))
             case e.Sum(terms):
-                return reduce(add, map(self.value, terms)) if terms else real(0.0)
+                return reduce(add, map(self._term, terms)) if terms else real(0.0)
             case e.Difference(of, minus):
                 return self.value(of) - self.value(minus)
             case e.Product(factors):
