@@ -60,7 +60,7 @@ class Piece(NamedTuple):
 
 def pieces(statements: str) -> list[Piece]:
     """Parse the statements of a block one by one, those within another one too."""
-    statements = re.sub(r"\(\*.*?\*\)", "", statements)
+    statements = re.sub(r" *\(\*.*?\*\)", "", statements)
     lines = re.findall(r"(?=\S)(?:.|\n)*?(?:;|\bTHEN|\bDO|\bELSE)(?=\n|$)", statements)
     found = _statements(lines)
     assert not lines, lines[-1]

@@ -21,7 +21,12 @@ TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bo
 
 def write_functions(tables: Tables, state: str) -> str:
     """Return the C functions that a compensator needs, `step` last."""
-    return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
+    labels = _labels(tables)
+    return "\n".join(_Writer(f, tables.sizes, labels, state).text() for f in functions(tables))
+
+
+def _labels(tables: Tables) -> dict[str, list[str]]:
+    return {dim: [comment(name) for name in names] for dim, names in tables.labels.items()}
 
 
 class _Writer(Printer):
@@ -29,8 +34,10 @@ class _Writer(Printer):
 
     operators: ClassVar[Mapping[Operator, str]] = {"and": "&&", "or": "||", "//": "/"}
 
-    def __init__(self, function: Function, sizes: Mapping[str, int], state: str) -> None:
-        super().__init__(function, sizes)
+    def __init__(
+        self, function: Function, sizes: Mapping[str, int], labels: Mapping[str, Sequence[str]], state: str
+    ) -> None:
+        super().__init__(function, sizes, labels)
         self._state = state
 
     def text(self) -> str:
@@ -53,7 +60,8 @@ class _Writer(Printer):
         pad, inner = "    " * depth, depth + 1
         match node:
             case n.Assign(target, value):
-                return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};"]
+                about = f" /* {said} */" if (said := self.about(target)) else ""
+                return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};{about}"]
             case n.ProcedureCall(name, arguments):
                 given = [self._as(a, "real" if a.kind == "time" else a.kind) for a in arguments]
                 return [f"{pad}tc_{name}({', '.join(['s', 'w', *given])});"]
@@ -119,8 +127,7 @@ def comment(text: str) -> str:
 
 def write_tables(tables: Tables, used: str) -> str:
     """Return the numbers used in a text, as C constants, with a comment beside each row of a table."""
-    labels = {dim: [comment(name) for name in names] for dim, names in tables.labels.items()}
-    text = ""
+    labels, text = _labels(tables), ""
     for name, var in _used("t", used, "c_").items():
         text += f"/* {var.about}{label_columns(var, labels)} */\n"
         text += f"static const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "

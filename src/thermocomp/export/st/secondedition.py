@@ -11,7 +11,7 @@ from thermocomp.export.st.ststatements import wrapped
 _PART = 500
 
 #: a statement, or its part up to the branches in it; a comment
-STATEMENT = re.compile(r"\(\*.*?\*\)|(?=\S)(?:.|\n)*?(?:;|\bTHEN|\bDO|\bELSE)(?=\n|$)", re.DOTALL)
+STATEMENT = re.compile(r"\(\*.*?\*\)|(?=\S)(?:.|\n)*?(?:;(?: \(\*.*?\*\))?|\bTHEN|\bDO|\bELSE)(?=\n|$)", re.DOTALL)
 #: a loop that runs a constant number of times
 LOOP = re.compile(r"FOR (\w+) := (\d+) TO (\d+) DO")
 #: an array without a name of its own

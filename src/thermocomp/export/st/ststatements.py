@@ -80,7 +80,7 @@ class _Writer(Printer):
         dialect: Dialect,
         others: Mapping[str, Mapping[str, Kind]],
     ) -> None:
-        super().__init__(function, tables.sizes)
+        super().__init__(function, tables.sizes, _labels(tables))
         self._name, self._scl, self._others = name, dialect == "scl", others
 
     def text(self) -> tuple[str, str]:
@@ -101,7 +101,8 @@ class _Writer(Printer):
             case n.Assign(target, n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Assign(target, one)], [n.Assign(target, other)]), depth)
             case n.Assign(target, value):
-                return [f"{pad}{self.value(target)} := {self.bare(value)};"]
+                about = f" (* {said} *)" if (said := self.about(target)) else ""
+                return [f"{pad}{self.value(target)} := {self.bare(value)};{about}"]
             case n.Return(n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Return(one)], [n.Return(other)]), depth)
             case n.Return(value):
@@ -205,13 +206,17 @@ def comment(text: str) -> str:
     return " ".join(text.split())
 
 
+def _labels(tables: Tables) -> dict[str, list[str]]:
+    return {dim: [comment(name).replace(";", ",") for name in names] for dim, names in tables.labels.items()}
+
+
 def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect) -> str:
     """Return the type of a structure: the variables used in a text, with the values of constants."""
     scl = dialect == "scl"
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
     lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
-    labels = {dim: [comment(name).replace(";", ",") for name in names] for dim, names in tables.labels.items()}
+    labels = _labels(tables)
     for name_, var in used_in(bag, used).items():
         size = size_of(var, tables.sizes)
         text = f"    {safe(name_)} : {array(var.kind, size) if var.dims else TYPES[var.kind]}"

@@ -22,13 +22,15 @@ class Printer(ABC):
     ----------
     sizes : mapping of str to int
         Sizes of the program's tables.
+    labels : mapping of str to sequence of str
+        Names of their rows and columns, by the sizes.
     """
 
     #: operators of the language that differ from those of the tree
     operators: ClassVar[Mapping[Operator, str]]
 
-    def __init__(self, function: Function, sizes: Mapping[str, int]) -> None:
-        self.function, self.sizes = function, sizes
+    def __init__(self, function: Function, sizes: Mapping[str, int], labels: Mapping[str, Sequence[str]]) -> None:
+        self.function, self.sizes, self.labels = function, sizes, labels
 
     def block(self, statements: Sequence[Statement], depth: int) -> list[str]:
         """Return statements as lines of text, at least one per statement."""
@@ -57,6 +59,13 @@ class Printer(ABC):
     @abstractmethod
     def call(self, name: str, arguments: Sequence[Expression]) -> str:
         """Return a call of a numeric function as text."""
+
+    def about(self, target: n.Name | n.Element) -> str:
+        """Return what a certain element of an array is; empty if it has no name."""
+        match target:
+            case n.Element(_, of, (n.Numeral(_, value),)) if names := self.labels.get(of.dims[0]):
+                return names[int(value)]
+        return ""
 
     def local(self, name: str) -> str:
         """Return a local variable of the function as text."""
