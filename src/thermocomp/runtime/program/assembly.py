@@ -39,17 +39,13 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
     return list(found.values())
 
 
-def used_locals(function: Function) -> dict[str, Kind]:
-    """Return the local variables that the statements of a function use, in order of appearance."""
-    names = dict.fromkeys(node.name for node in walk(function.body) if isinstance(node, Name) and not node.record)
-    return {name: function.locals[name] for name in names if name in function.locals}
-
-
 def grouped_locals(function: Function, types: Mapping[Kind, str]) -> dict[str, list[str]]:
     """Return the names of the local variables that the statements of a function use, by their type."""
+    names = dict.fromkeys(node.name for node in walk(function.body) if isinstance(node, Name) and not node.record)
     found: dict[str, list[str]] = {}
-    for name, kind in used_locals(function).items():
-        found.setdefault(types[kind], []).append(name)
+    for name in names:
+        if name in function.locals:
+            found.setdefault(types[function.locals[name]], []).append(name)
     return found
 
 

@@ -99,18 +99,18 @@ def _pace(lag: Lags) -> tuple[float, float, e.Node | None]:
             return stopped, running, stripped(pace)
 
 
-class Bank:
+class TableBank:
     """Values of the models of one function that are computed by loops over tables.
 
     Parameters
     ----------
     outputs : iterable of Node
         Formulas of the models, with inputs numbered like the ranges.
-    before : sequence of Bank
+    before : sequence of TableBank
         Of the other functions: their rows come first in the tables.
     """
 
-    def __init__(self, outputs: Iterable[e.Node], before: Sequence["Bank"]) -> None:
+    def __init__(self, outputs: Iterable[e.Node], before: Sequence["TableBank"]) -> None:
         self._levels: dict[e.Node, int] = {}
         self.inputs, self.lags, self.sums = list[e.Clip](), list[Lags](), list[e.Sum]()
         outputs = list(map(stripped, outputs))
@@ -191,7 +191,7 @@ class Bank:
         }
 
 
-def join(banks: Sequence[Bank]) -> tuple[dict[str, int], dict[str, list[Any]]]:
+def join(banks: Sequence[TableBank]) -> tuple[dict[str, int], dict[str, list[Any]]]:
     """Return the sizes and tables of all banks."""
     count = {name: sum(len(rows) for b in banks if (rows := b.rows[name])) for name in banks[0].rows}
     tables = [b.tables(count["sums"]) for b in banks]

@@ -1,12 +1,14 @@
 """What the rows and columns of the tables are: sensors with their units, lags, targets."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
-from thermocomp.core.model import ErrorModel
 from thermocomp.core.watch import Watch
-from thermocomp.runtime.program.banks import Bank, stripped
+from thermocomp.runtime.compensator import Compensator
+from thermocomp.runtime.program.banks import stripped
+from thermocomp.runtime.program.models import Formulas
 
 Labels = dict[str, list[str]]
 
@@ -30,27 +32,42 @@ def label_node(node: e.Node, ranges: Sequence[Input]) -> str:
     return e.format_node(node)
 
 
-def label_banks(
-    banks: Sequence[Bank], ranges: Sequence[Input], models: Sequence[ErrorModel], nodes: Mapping[int, e.Node]
+def label_all(
+    compensator: Compensator,
+    channels: Sequence[Input],
+    ranges: Sequence[Input],
+    values: Mapping[str, Any],
+    formulas: Formulas,
 ) -> Labels:
-    """Return the labels of the tables of the models.
+    """Return the labels of all tables by the names of their sizes.
 
     Parameters
     ----------
-    nodes : mapping of int to Node
-        Formula of each model.
+    channels, ranges : sequence of Input
+        Values of a reading, and inputs of the models.
+    values : mapping of str to object
+        The tables.
+    formulas : Formulas
     """
-    of: dict[e.Node, str] = {}
-    for k, node in nodes.items():
+    models, banks = compensator.models, formulas.banks
+    part_of: dict[e.Node, str] = {}
+    for k, node in formulas.nodes.items():
         for part in e.walk_nodes(stripped(node)):
-            of.setdefault(part, models[k].target if part == stripped(node) else f"part of {models[k].target}")
-    paces = [pace for b in banks for pace in b.paces]
+            part_of.setdefault(part, models[k].target if part == stripped(node) else f"part of {models[k].target}")
     return {
+        "CHANNELS": label_inputs(channels),
+        "RANGES": label_inputs(ranges),
+        "FED": label_inputs([channels[k] for k in values["feed_channel"]]),
+        "MEMBERS": label_inputs([ranges[k] for k in values["set_range"]]),
+        "SUPPORTED": label_inputs([ranges[k] for k in values["member_range"]]),
+        "MODELS": [m.target for m in models],
+        "TARGETS": [f"{target} [um]" for target in compensator.lines],
         "INPUTS": [label_node(n, ranges) for b in banks for n in b.inputs],
         "TERMS": [label_node(n, ranges) for b in banks for n in b.terms],
         "BANKED": [label_node(n, ranges) for b in banks for n in b.lags],
-        "PACES": [f"pace: {label_node(pace, ranges)}" if pace else "constant" for _, _, pace in paces],
-        "SUMS": [of[n] for b in banks for n in b.sums],
+        "PACES": [f"pace: {label_node(n, ranges)}" if n else "constant" for b in banks for *_, n in b.paces],
+        "SUMS": [part_of[n] for b in banks for n in b.sums],
+        **label_watch(compensator.watches[0] if compensator.watches else None),
     }
 
 

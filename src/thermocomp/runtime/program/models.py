@@ -1,7 +1,7 @@
 """Formulas of models as functions of a program: one variable per node, with lags and ticks in the state."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import reduce
 from operator import add, mul
 from typing import Any
@@ -10,7 +10,7 @@ from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.recurrences import Clock
-from thermocomp.runtime.program.banks import Bank, join, stripped
+from thermocomp.runtime.program.banks import TableBank, join, stripped
 from thermocomp.runtime.program.clocks import run_clock
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
@@ -36,27 +36,28 @@ class Formulas:
         Inputs of the models, without duplicates.
     channels : sequence of int
         Index of each input among the values of a reading.
-    groups : mapping of str to sequence of (int, ErrorModel)
-        Index and model of the outputs of each function; ``models_`` is prefixed to its name.
+    models : sequence of ErrorModel
     """
 
-    def __init__(
-        self, ranges: Sequence[Input], channels: Sequence[int], groups: Mapping[str, Sequence[tuple[int, ErrorModel]]]
-    ) -> None:
+    def __init__(self, ranges: Sequence[Input], channels: Sequence[int], models: Sequence[ErrorModel]) -> None:
         self.channels = channels
         self._supports = Supports(ranges)
-        self.nodes = {k: formula(m, tuple(ranges)) for models in groups.values() for k, m in models}
-        self.banks = list[Bank]()
-        for models in groups.values():
-            self.banks.append(Bank([self.nodes[k] for k, _ in models], self.banks))
+        self.nodes = {k: formula(m, tuple(ranges)) for k, m in enumerate(models)}
+        self.banks = list[TableBank]()
+        groups = {
+            name: [(k, m) for k, m in enumerate(models) if any(i.rezero for i in m.inputs) == rezeroed]
+            for name, rezeroed in (("absolute", False), ("rezeroed", True))
+        }
+        for group in groups.values():
+            self.banks.append(TableBank([self.nodes[k] for k, _ in group], self.banks))
         self.lags = sum(len(b.lags) for b in self.banks)
         self.clocks: list[_Clock] = []
         self.x, self.y = list[float](), list[float]()
         self.functions: dict[str, Function] = {}  #: by name
-        for (name, models), bank in zip(groups.items(), self.banks, strict=True):
-            self._add(name, models, bank)
+        for (name, group), bank in zip(groups.items(), self.banks, strict=True):
+            self._add(name, group, bank)
 
-    def _add(self, name: str, models: Iterable[tuple[int, ErrorModel]], bank: Bank) -> None:
+    def _add(self, name: str, models: Iterable[tuple[int, ErrorModel]], bank: TableBank) -> None:
         """Record the function that computes the outputs of models."""
         s = Kept()
         begun = s.begun_absolute if name == "absolute" else s.begun_rezeroed
@@ -187,7 +188,7 @@ class _Arithmetic:
 class _Formula(_Arithmetic):
     """Formula of models, with lags, tables and values updated at fixed intervals."""
 
-    def __init__(self, formulas: Formulas, bank: Bank, begun: Condition) -> None:
+    def __init__(self, formulas: Formulas, bank: TableBank, begun: Condition) -> None:
         super().__init__()
         self._formulas, self._bank, self._begun = formulas, bank, begun
         w = Work()
