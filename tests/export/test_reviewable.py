@@ -50,7 +50,7 @@ class Odd(Polynomial):
         def small(node: e.Node) -> e.Node:
             return e.Sigmoid(e.Product((e.Constant(1e-3), node)))
 
-        return e.Sum((e.Product((e.Constant(0.5), one)), small(two), e.Lag(small(one), 90.0)))
+        return e.Sum((e.Product((e.Constant(0.5), one)), small(two), e.Lag(small(e.Sum((x, product))), 90.0)))
 
 
 def test_what_fits_no_table_is_the_same_number() -> None:

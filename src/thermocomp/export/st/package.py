@@ -177,8 +177,8 @@ def write_blocks(
     return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
 
 
-def _kilobytes(tables: Tables, bags: Iterable[str] = BAGS) -> int:
-    """Return the approximate size of an instance, with its constants, or of some of its structures [kB]."""
+def _kilobytes(tables: Tables, bags: Iterable[str] = (*BAGS, "s")) -> int:
+    """Return the approximate size of an instance, with two states and its constants, or of some structures [kB]."""
     variables = [v for bag in bags for v in RECORDS[bag].variables().values()]
     return 1 + 8 * sum(math.prod(tables.sizes.get(d, 0) for d in v.dims) for v in variables) // 1000
 
