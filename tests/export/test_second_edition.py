@@ -143,7 +143,9 @@ def test_the_project_holds_the_same(plain: list[SourceUnit]) -> None:
         if unit.end:
             assert (pous[unit.name].findtext(".//p:ST/h:xhtml", "", XML)) == unit.statements.rstrip("\n")
             names = [v.attrib["name"] for v in pous[unit.name].iterfind(".//p:variable", XML)]
-            assert names == re.findall(r"^    (\w+) :", unit.declaration, re.MULTILINE)
+            assert names == re.findall(
+                r"\w+", " ".join(re.findall(r"^    ([\w, ]+) :", unit.declaration, re.MULTILINE))
+            )
     block = pous["tc_x"]
     assert block.attrib["pouType"] == "functionBlock"
     assert {

@@ -60,6 +60,7 @@ class Piece(NamedTuple):
 
 def pieces(statements: str) -> list[Piece]:
     """Parse the statements of a block one by one, those within another one too."""
+    statements = re.sub(r" *\(\*.*?\*\)", "", statements)
     lines = re.findall(r"(?=\S)(?:.|\n)*?(?:;|\bTHEN|\bDO|\bELSE)(?=\n|$)", statements)
     found = _statements(lines)
     assert not lines, lines[-1]
@@ -117,13 +118,13 @@ def block_of(unit: SourceUnit) -> Block:
     found, head = [], f"{word} x{' : ' + gives if gives else ''}"
     for section, body in re.findall(r"(VAR\w*)\n(.*?)END_VAR", sections, re.DOTALL):
         for line in filter(None, " ".join(body.split()).split(";")):
-            one = re.fullmatch(r" ?(\w+) : (.*?)( := .*)?", line.rstrip())
+            one = re.fullmatch(r" ?([\w, ]+) : (.*?)( := .*)?", line.rstrip())
             assert one, line
-            variable, what, start = one.groups(default="")
+            names, what, start = one.groups(default="")
             few = re.sub(r"\[(\w+)(, \w+)*\]", r"[\1, \1]", start)
             small = re.sub(r"0\.\.\d+", "0..1", what)
-            parsed(f"{head}\n{section}\n    x1 : {small}{few};\nEND_VAR\n{unit.end}\n")
-            found.append((section, variable, kind_of(what)))
+            parsed(f"{head}\n{section}\n    x1{', x2' * (',' in names)} : {small}{few};\nEND_VAR\n{unit.end}\n")
+            found += [(section, variable, kind_of(what)) for variable in names.split(", ")]
     _check_names({variable for _, variable, _ in found} | {name})
     return Block(name, gives, found, pieces(unit.statements))
 
@@ -155,7 +156,7 @@ def declared(text: str) -> dict[str, tuple[Type, Any]]:
     for name, what, start in re.findall(r"(\w+) : (.*?)(?: := (.*?))?;", " ".join(body.group(1).split())):
         kind = kind_of(what)
         sized = kind[1] if isinstance(kind, tuple) else ""
-        texts = start.strip("[]").split(", ") if start else []
+        texts = start.strip("[] ").split(", ") if start else []
         kinds = list(dict.fromkeys(re.sub(r"\d+", "1", t) for t in texts))
         shown = f"[{', '.join([*kinds, *kinds[-1:]])}]" if sized else "".join(kinds)
         member = f"x : {f'ARRAY[0..1] OF {sized}' if sized else what}{f' := {shown}' if texts else ''}"

@@ -1,5 +1,10 @@
 """Instruction page of an exported compensator, for all languages: inputs, outputs, and their meaning."""
 
+from collections.abc import Iterable
+
+import numpy as np
+
+from thermocomp.core.model import ErrorModel
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables
 
@@ -20,6 +25,82 @@ _POWER = """The temperatures of a warm machine must not become the zero. After a
 
 `{of}warm` says that the temperatures of the start look like those of a warm machine: a hint for the operator's
 message, not reliable enough to decide."""
+
+#: inputs named in the summary of a target
+_MOST = 6
+
+
+def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off: str) -> list[str]:
+    """Return what a reader of the code must know, as paragraphs for the comment above it.
+
+    Parameters
+    ----------
+    kept, cold, off : str
+        How a state is retained, how the code is told that the machine is cold, and how it is switched off.
+    """
+    limits, values = compensator.limits, tables.values
+    held = f"held for {limits.hold:g} s, then decays to 0 with a time constant of {limits.fade:g} s"
+    found = [
+        "WHICH INPUTS COUNT MOST: change of the deviation, settled, when one input alone goes through its trained range"
+    ]
+    for target, line in compensator.lines.items():
+        total: dict[str, float] = {}
+        for k in range(line.models.start, line.models.stop):
+            for name, change in _changes(compensator.models[k]).items():
+                total[name] = total.get(name, 0.0) + values["to_offset"][k] * change
+        most = sorted(total.items(), key=lambda item: -abs(item[1]))[:_MOST]
+        found.append(f"{target}: {', '.join(f'{name} {change:+.3g} um' for name, change in most)}")
+    if tables.sensors:
+        needs: dict[str, list[str]] = {}
+        for k, model in enumerate(compensator.models):
+            pairs = zip(tables.sensors, values["leans_on"][k], values["may_lose"][k], strict=True)
+            names = [name for name, leans, may_lose in pairs if leans and not may_lose]
+            needs.setdefault(", ".join(names) or "none", []).append(model.target)
+        needed = [f"{sensors} for {', '.join(targets)}" for sensors, targets in needs.items()]
+        found.append(
+            "A SENSOR THAT FAILS (fault above 0: missing, stuck, stepped, swapped, implausible) is replaced by its "
+            "prediction from the others, and read again when it agrees with that. A correction goes on if its model "
+            f"was judged to be better without the sensor than no compensation; otherwise it is {held}. Sensors that "
+            f"must not fail: {'; '.join(needed)}."
+        )
+    else:
+        found.append(
+            "A SENSOR THAT FAILS: sensors are not monitored. With a missing or impossible value every correction is "
+            f"{held}. A value that is wrong but possible is not noticed."
+        )
+    found += [
+        "AT POWER-UP status is 5 and the correction 0, until one of these: a retained state continues "
+        f"({kept}, at most {values['resumable'] / 3600.0:g} h without power); the machine was off for more than "
+        f"{values['cold_after'] / 3600.0:.1f} h; it is told cold ({cold}); the correction is re-zeroed "
+        "by a measurement.",
+        "BEYOND THE TRAINED RANGE inputs count as at its end (input_low, input_high: the range and "
+        f"{_listed(f'{100.0 * m.support.margin:g} %' for m in compensator.models)} of it on either side); outside "
+        f"counts them. Then a model {_listed(_POLICIES[m.support.policy] for m in compensator.models)}. A reading far "
+        "beyond (room) is not used: rejected = 2.",
+        f"TO SWITCH IT OFF: {off}; the correction is {held}. Do not write 0 in its place: the axis would jump.",
+    ]
+    return found
+
+
+def _changes(model: ErrorModel) -> dict[str, float]:
+    """Return the change of a model's deviation, settled, when one input alone goes through its trained range [um]."""
+    rest = np.array([i.reference for i in model.inputs])
+    low, high = (np.diag([getattr(i, end) for i in model.inputs]) for end in ("low", "high"))
+    _, said = model.step(model.init(rest), rest + np.concatenate((low, high)), 0.0)
+    first, last = np.split(said, 2)
+    return dict(zip((i.name for i in model.inputs), (last - first).tolist(), strict=True))
+
+
+#: what a model does beyond its range
+_POLICIES = {
+    "clip": "goes on with these",
+    "hold": "keeps its last value within the range",
+    "fade": "fades to 0 with the distance",
+}
+
+
+def _listed(words: Iterable[str]) -> str:
+    return " or ".join(dict.fromkeys(words))
 
 
 def _geometry(tables: Tables, of: str) -> str:

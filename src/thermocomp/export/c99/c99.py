@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from thermocomp.export.c99.cstatements import write_functions, write_tables, write_variables
+from thermocomp.export.c99.cstatements import comment, write_functions, write_tables, write_variables
 from thermocomp.runtime.program.tables import Tables
 
 _HEADER = """{facts}#ifndef {guard}
@@ -231,16 +231,23 @@ class Sources:
     source: str
 
 
-def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_only: bool = False) -> Sources:
+def translate(
+    tables: Tables, name: str, facts: Sequence[str] = (), told: Sequence[str] = (), *, double_only: bool = False
+) -> Sources:
     """Return a compensator in C99.
 
     The code processes values as `Compensator.step` processes a reading.
+
+    Parameters
+    ----------
+    facts, told : sequence of str
+        Comments above both files, and above the source.
     """
     name, n, sizes = identifier(name), len(tables.channels), tables.sizes
     functions = write_functions(tables, name)
     above = "".join(f"/* {comment(line)} */\n" for line in facts)
     source = _SOURCE.format(
-        facts=above,
+        facts=above + "".join(f"/* {comment(line)} */\n" for line in told),
         name=name,
         n=n,
         work=write_variables(sizes, "w", functions + "w->value w->age w->dt w->counter"),
@@ -267,9 +274,10 @@ def translate(tables: Tables, name: str, facts: Sequence[str] = (), *, double_on
 
 def _wrapped(line: str) -> str:
     """Return a long line as several: C compilers need not accept more than 4,095 characters."""
-    if len(line) <= 200:
+    if len(line) <= 120:
         return line
-    return textwrap.fill(line, 110, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False) + "\n"
+    indent = line[: len(line) - len(line.lstrip())] + "    "
+    return textwrap.fill(line, 116, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
 def _enumerated(name: str, kind: str, texts: Sequence[str]) -> str:
@@ -286,10 +294,3 @@ def identifier(name: str) -> str:
     """Return a valid C identifier close to a name."""
     text = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
     return f"tc_{text}"
-
-
-def comment(text: str) -> str:
-    """Return a text in which nothing ends a C comment."""
-    for sign in ("*/", "/*", "??"):
-        text = text.replace(sign, " ".join(sign))
-    return " ".join(text.split())

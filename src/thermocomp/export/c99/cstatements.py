@@ -9,9 +9,9 @@ import numpy as np
 
 from thermocomp.core.bounds import round_single, round_within
 from thermocomp.runtime.program import tree as n
-from thermocomp.runtime.program.assembly import functions, used_locals
+from thermocomp.runtime.program.assembly import functions, grouped_locals
 from thermocomp.runtime.program.declarations import Var
-from thermocomp.runtime.program.printer import Printer
+from thermocomp.runtime.program.printer import Printer, compact, label_columns, label_rows
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS
@@ -21,7 +21,12 @@ TYPES: dict[Kind, str] = {"real": "tc_real", "time": "double", "int": "int", "bo
 
 def write_functions(tables: Tables, state: str) -> str:
     """Return the C functions that a compensator needs, `step` last."""
-    return "\n".join(_Writer(f, tables.sizes, state).text() for f in functions(tables))
+    labels = _labels(tables)
+    return "\n".join(_Writer(f, tables.sizes, labels, state).text() for f in functions(tables))
+
+
+def _labels(tables: Tables) -> dict[str, list[str]]:
+    return {dim: [comment(name) for name in names] for dim, names in tables.labels.items()}
 
 
 class _Writer(Printer):
@@ -29,8 +34,10 @@ class _Writer(Printer):
 
     operators: ClassVar[Mapping[Operator, str]] = {"and": "&&", "or": "||", "//": "/"}
 
-    def __init__(self, function: Function, sizes: Mapping[str, int], state: str) -> None:
-        super().__init__(function, sizes)
+    def __init__(
+        self, function: Function, sizes: Mapping[str, int], labels: Mapping[str, Sequence[str]], state: str
+    ) -> None:
+        super().__init__(function, sizes, labels)
         self._state = state
 
     def text(self) -> str:
@@ -41,9 +48,9 @@ class _Writer(Printer):
             head += f"tc_real tc_{f.name}({', '.join(rest)})"
         else:
             head += f"void tc_{f.name}({', '.join([f'{self._state}_state *s', f'{self._state}_work *w', *rest])})"
-        lines = self.block(f.body, 1)
+        lines = compact(self.block(f.body, 1), r"(if|for|while) \(.*\{", r"\} else \{", r"\}")
         text = "\n".join(lines)
-        declared = [f"    {TYPES[kind]} {name};" for name, kind in used_locals(f).items()]
+        declared = [f"    {kind} {', '.join(names)};" for kind, names in grouped_locals(f, TYPES).items()]
         passed = [] if f.is_of_numbers or "(s, w" in text else [v for v in "sw" if f"{v}->" not in text]
         passed += [p for p in f.parameters if not re.search(rf"\b{p}\b", text)]
         unused = [f"    (void){v};" for v in passed]
@@ -53,7 +60,8 @@ class _Writer(Printer):
         pad, inner = "    " * depth, depth + 1
         match node:
             case n.Assign(target, value):
-                return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};"]
+                about = f" /* {said} */" if (said := self.about(target)) else ""
+                return [f"{pad}{self.value(target)} = {self._as(value, target.kind)};{about}"]
             case n.ProcedureCall(name, arguments):
                 given = [self._as(a, "real" if a.kind == "time" else a.kind) for a in arguments]
                 return [f"{pad}tc_{name}({', '.join(['s', 'w', *given])});"]
@@ -106,17 +114,43 @@ def _number(value: float, kind: Kind, *, cap: bool = False) -> str:
     single = float(round_within(size, 0.0, size) if cap else round_single(size))
     with np.errstate(over="ignore"):
         nearest = float(np.float32(size))
-    written = f"TC({text})" if single == nearest else f"TC_ROUNDED({text}, {single!r})"
-    return f"(-{written})" if math.copysign(1.0, value) < 0 else written
+    sign = "-" if math.copysign(1.0, value) < 0 else ""
+    return f"TC({sign}{text})" if single == nearest else f"TC_ROUNDED({sign}{text}, {sign}{single!r})"
+
+
+def comment(text: str) -> str:
+    """Return a text in which nothing ends a C comment."""
+    for sign in ("*/", "/*", "??"):
+        text = text.replace(sign, " ".join(sign))
+    return " ".join(text.split())
 
 
 def write_tables(tables: Tables, used: str) -> str:
-    """Return the numbers used in a text, as C constants."""
-    return "".join(
-        f"/* {var.about} */\nstatic const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "
-        f"{_list(tables.values[name], var)};\n"
-        for name, var in _used("t", used, "c_").items()
-    )
+    """Return the numbers used in a text, as C constants, with a comment beside each row of a table."""
+    labels, text = _labels(tables), ""
+    for name, var in _used("t", used, "c_").items():
+        text += f"/* {var.about}{label_columns(var, labels)} */\n"
+        text += f"static const {TYPES[var.kind]} c_{name}{_dims(var, tables.sizes)} = "
+        found = tables.values[name]
+        if var.dims and found and (var.dims[0] in labels or len(var.dims) > 1):
+            text += "\n".join(["{", *_rows(found, var, var.dims, labels), "};\n"])
+        else:
+            text += f"{_list(found, var)};\n"
+    return text
+
+
+def _rows(found: list[Any], var: Var, dims: Sequence[str], labels: Mapping[str, Sequence[str]]) -> list[str]:
+    if len(dims) > 2:
+        tables = [_rows(value, var, dims[1:], labels) for value in found]
+        names = labels.get(dims[0], range(len(found)))
+        return [
+            line for name, rows in zip(names, tables, strict=True) for line in (f"    {{ /* {name} */", *rows, "    },")
+        ]
+    lines = []
+    for name, value in label_rows(found, dims, labels):
+        text, about = f"    {_list(value, var)},", f"/* {name} */" if name else ""
+        lines += [f"{text} {about}".rstrip()] if len(text) + len(about) < 118 else [f"    {about}".rstrip(), text]
+    return lines
 
 
 def _used(owner: str, used: str, before: str) -> dict[str, Var]:

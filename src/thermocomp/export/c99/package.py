@@ -9,10 +9,10 @@ import numpy as np
 
 from thermocomp.core.bounds import round_single
 from thermocomp.core.exceptions import SettingError
-from thermocomp.export.c99.c99 import translate
+from thermocomp.export.c99.c99 import identifier, translate
 from thermocomp.export.c99.ctest import write_test
 from thermocomp.export.facts import Facts
-from thermocomp.export.pages import describe
+from thermocomp.export.pages import describe, explain
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
 from thermocomp.runtime.compensator import Compensator
@@ -112,7 +112,15 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
             if single
             else f"Single precision (-DTC_FLOAT) does not compile: it is too coarse for this model ({loss:.2g} um)"
         )
-    sources = translate(tables, name, said, double_only=not single)
+    own = identifier(name)
+    told = explain(
+        compensator,
+        tables,
+        kept=f"{own}_power_up with the state from {own}_save and the time",
+        cold=f"{own}_cold",
+        off=f"{own}_step with an age of 1e9",
+    )
+    sources = translate(tables, name, said, told, double_only=not single)
     name = sources.name
     texts = {
         f"{name}.h": sources.header,

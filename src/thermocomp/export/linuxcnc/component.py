@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 
 from thermocomp.core.exceptions import InputError
-from thermocomp.export.c99.c99 import comment
+from thermocomp.export.c99.cstatements import comment
 from thermocomp.runtime.program.tables import Tables
 
 #: resolution of the external offset counts [mm]

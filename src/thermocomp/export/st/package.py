@@ -7,11 +7,11 @@ from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
-from thermocomp.export.pages import describe
+from thermocomp.export.pages import describe, explain
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
-from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
-from thermocomp.export.st.ststatements import BAGS, Dialect
+from thermocomp.export.st.structuredtext import SourceUnit, translate
+from thermocomp.export.st.ststatements import BAGS, Dialect, comment, wrapped
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import make_readings, replay
@@ -138,7 +138,14 @@ def write_blocks(
     answers = replay(compensator, tables, readings)
     units = [*translate(tables, name, dialect), *more]
     tests = write_test(tables, name, dialect, readings, answers)
-    head = "".join(f"(* {comment(line)} *)\n" for line in said)
+    more_said = explain(
+        compensator,
+        tables,
+        kept="kept, and off_time above 0",
+        cold="cold, or a rising edge of restart",
+        off="age := 1.0E+9",
+    )
+    head, told = ("".join(wrapped(f"(* {comment(x)} *)") + "\n" for x in lines) for lines in (said, more_said))
     page = _README.format(
         facts="  \n".join(said),
         name=name,
@@ -152,7 +159,7 @@ def write_blocks(
         **describe(compensator, tables),
     )
     if dialect == "twincat":
-        files = dict(_object(unit, head) for unit in [*units, *tests])
+        files = dict(_object(unit, head + told * (unit.name == name)) for unit in [*units, *tests])
     else:
         suffix = "scl" if dialect == "scl" else "st"
         files = {}
@@ -164,14 +171,14 @@ def write_blocks(
                 tests = [u for u in plain if u.name.startswith(tuple(names))]
                 units = [u for u in plain if u not in tests]
         files |= {
-            f"{name}.{suffix}": _joined(units, head, dialect),
+            f"{name}.{suffix}": _joined(units, head + told, dialect),
             f"{name}_test.{suffix}": _joined(tests, head, dialect),
         }
     return {file: text.encode() for file, text in {**files, f"{name}.md": page}.items()}
 
 
-def _kilobytes(tables: Tables, bags: Iterable[str] = BAGS) -> int:
-    """Return the approximate size of an instance, with its constants, or of some of its structures [kB]."""
+def _kilobytes(tables: Tables, bags: Iterable[str] = (*BAGS, "s")) -> int:
+    """Return the approximate size of an instance, with two states and its constants, or of some structures [kB]."""
     variables = [v for bag in bags for v in RECORDS[bag].variables().values()]
     return 1 + 8 * sum(math.prod(tables.sizes.get(d, 0) for d in v.dims) for v in variables) // 1000
 
@@ -182,9 +189,11 @@ def _joined(units: Sequence[SourceUnit], head: str, dialect: Dialect) -> str:
 
 def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
     """Return the name and the text of a TwinCAT 3 file for a block or type."""
-    body = f"\n    <Implementation><ST><![CDATA[{unit.statements}]]></ST></Implementation>" if unit.end else ""
+    body = (
+        f"\n    <Implementation><ST><![CDATA[{chr(10).join(unit.body())}\n]]></ST></Implementation>" if unit.end else ""
+    )
     kind = "POU" if unit.end else "DUT"
-    first, rest = unit.declaration.split("\n", 1)
+    first, rest = unit.head().split("\n", 1)
     text = _OBJECT.format(
         kind=kind,
         name=unit.name,

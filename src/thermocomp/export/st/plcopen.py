@@ -59,17 +59,22 @@ def _data_type(parent: ET.Element, unit: SourceUnit) -> None:
 
 def _variables(parent: ET.Element, text: str) -> None:
     """Add the variables of a section, with their comments."""
-    for name, kind, start, about in re.findall(
-        r"^ +(\w+) : (\w+)(?: := ([^;]*))?;(?:\n +\(\*(.*?)\*\))?", text, re.MULTILINE | re.DOTALL
+    for names, kind, start, about in re.findall(
+        r"^ +([\w, ]+) : (\w+)(?: := ([^;]*))?;(?:\s+\(\*(.*?)\*\))?", text, re.MULTILINE | re.DOTALL
     ):
-        variable = ET.SubElement(parent, "variable", name=name)
-        _type(ET.SubElement(variable, "type"), kind)
-        if start:
-            values = ET.SubElement(ET.SubElement(variable, "initialValue"), "arrayValue")
-            for v in start.strip("[]").split(","):
-                ET.SubElement(ET.SubElement(values, "value"), "simpleValue", value=v.strip())
-        if about:
-            _text(ET.SubElement(variable, "documentation"), about.strip())
+        for name in names.split(", "):
+            _variable(parent, name, kind, start, about)
+
+
+def _variable(parent: ET.Element, name: str, kind: str, start: str, about: str) -> None:
+    variable = ET.SubElement(parent, "variable", name=name)
+    _type(ET.SubElement(variable, "type"), kind)
+    if start:
+        values = ET.SubElement(ET.SubElement(variable, "initialValue"), "arrayValue")
+        for v in start.strip("[]").split(","):
+            ET.SubElement(ET.SubElement(values, "value"), "simpleValue", value=v.strip())
+    if about:
+        _text(ET.SubElement(variable, "documentation"), about.strip())
 
 
 def _pou(parent: ET.Element, unit: SourceUnit) -> None:

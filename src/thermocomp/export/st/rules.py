@@ -55,7 +55,8 @@ def _loops(_: SourceUnit, statements: Sequence[str], __: set[str]) -> Found:
 
 
 def _names(unit: SourceUnit) -> list[str]:
-    return re.findall(r"^ +(\w+) :", _COMMENT.sub("", unit.declaration), re.MULTILINE)
+    found = re.findall(r"^ +([\w, ]+) :", _COMMENT.sub("", unit.declaration), re.MULTILINE)
+    return [name for names in found for name in names.split(", ")]
 
 
 def _reserved(unit: SourceUnit, _: Sequence[str], __: set[str]) -> Found:

@@ -11,13 +11,16 @@ from thermocomp.export.st.ststatements import wrapped
 _PART = 500
 
 #: a statement, or its part up to the branches in it; a comment
-STATEMENT = re.compile(r"\(\*.*?\*\)|(?=\S)(?:.|\n)*?(?:;|\bTHEN|\bDO|\bELSE)(?=\n|$)", re.DOTALL)
+STATEMENT = re.compile(r"\(\*.*?\*\)|(?=\S)(?:.|\n)*?(?:;(?: \(\*.*?\*\))?|\bTHEN|\bDO|\bELSE)(?=\n|$)", re.DOTALL)
 #: a loop that runs a constant number of times
 LOOP = re.compile(r"FOR (\w+) := (\d+) TO (\d+) DO")
 #: an array without a name of its own
 ARRAY = re.compile(r"ARRAY\[0\.\.(\d+)\] OF (\w+)")
 #: a member of a structure, or a variable, with its initial value
 VALUED = re.compile(r"^ +(\w+) :\s+(\w+)\s+:=\s+([^;]*);", re.MULTILINE)
+
+#: a comment beside initial values
+_COMMENT = re.compile(r"\(\*.*?\*\)")
 
 
 def adapt(units: Sequence[SourceUnit], name: str) -> list[SourceUnit]:
@@ -55,11 +58,15 @@ def adapt(units: Sequence[SourceUnit], name: str) -> list[SourceUnit]:
 
 def _structure(name: str, text: str) -> list[SourceUnit]:
     """Return a structure without initial values, and the functions that assign them; zeros are the default."""
-    lines = []
+    lines = list[str]()
     for member, _, start in VALUED.findall(text):
-        values = [v.strip() for v in start.strip("[]").split(",")]
-        to = [f"t.{member}[{k}]" if start.startswith("[") else f"t.{member}" for k in range(len(values))]
-        lines += [f"{at} := {v};" for at, v in zip(to, values, strict=True) if v not in ("0", "0.0", "FALSE")]
+        k = 0
+        for line in start.splitlines():
+            lines += _COMMENT.findall(line)
+            for v in filter(None, re.split(r"[,\s\[\]]+", _COMMENT.sub("", line))):
+                if v not in ("0", "0.0", "FALSE"):
+                    lines.append(f"t.{member}{f'[{k}]' if start.startswith('[') else ''} := {v};")
+                k += 1
     bare = VALUED.sub(r"    \1 : \2;", text).replace("END_STRUCT\n", "END_STRUCT;\n")
     found = [SourceUnit(name, bare)]
     for k in range(0, len(lines), _PART):

@@ -1,5 +1,6 @@
 """IEC 61131-3: a compensator as a function block with its functions and types."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -10,6 +11,7 @@ from thermocomp.export.st.ststatements import (
     TYPES,
     Dialect,
     array,
+    comment,
     number,
     quoted,
     safe,
@@ -20,7 +22,7 @@ from thermocomp.export.st.ststatements import (
     write_functions,
     write_type,
 )
-from thermocomp.runtime.program.declarations import Var
+from thermocomp.runtime.program.printer import compact
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Kind
 
@@ -55,7 +57,7 @@ _OWN = {"running": "BOOL", "restarted": "BOOL", "rezeroed": "BOOL", "unsaved": "
 
 _BODY = """IF {first} OR NOT {running} THEN
     {running} := TRUE;
-    {start}({s}, known := FALSE, keep := FALSE);
+    {start}({s}, none := {none}, known := FALSE, keep := FALSE);
     IF {kept}.model = {t}.fingerprint THEN
         IF {check}(s := {kept}) = {kept}.checked THEN
             {_}s := {kept};
@@ -63,7 +65,7 @@ _BODY = """IF {first} OR NOT {running} THEN
     END_IF;
     {power_up}({bags}, off := {off_time});
     IF {w}.begins > 0 THEN
-        {start}({s}, known := ({w}.begins = 1), keep := FALSE);
+        {start}({s}, none := {none}, known := ({w}.begins = 1), keep := FALSE);
     END_IF;
 END_IF;
 {unknown} := FALSE;
@@ -71,7 +73,7 @@ FOR {k} := 0 TO {last_target} DO
     {unknown} := {unknown} OR NOT {_}s.referenced[{k}];
 END_FOR;
 IF ({restart} AND NOT {restarted}) OR ({cold} AND {unknown}) THEN
-    {start}({s}, known := TRUE, keep := TRUE);
+    {start}({s}, none := {none}, known := TRUE, keep := TRUE);
 END_IF;
 {restarted} := {restart};
 IF {rezero} AND NOT {rezeroed} THEN
@@ -97,8 +99,14 @@ IF {first} OR ({unsaved} >= {interval}) OR ({unsaved} < 0.0) THEN
     {kept}.model := {t}.fingerprint;
 END_IF;
 """
+#: factors of variables in one statement of the check value
+_FACTORS = ("", "0.7 * ", "0.4 * ")
 #: longest time between two copies of the state to the retained one [s]
 INTERVAL = 10.0
+
+
+#: longest section of declarations on one line [characters]
+_SHORT = 110
 
 
 @dataclass(frozen=True)
@@ -123,7 +131,21 @@ class SourceUnit:
         if not self.end:
             return self.declaration + "\n"
         begin = ["BEGIN"] if dialect == "scl" else []
-        return "\n".join([self.declaration, *begin, self.statements.rstrip("\n"), self.end]) + "\n"
+        return "\n".join([self.head(), *begin, *self.body(), self.end]) + "\n"
+
+    def head(self) -> str:
+        """Return the declarations with short sections on one line: only spaces differ."""
+
+        def joined(section: re.Match[str]) -> str:
+            text = " ".join(section[0].split())
+            return text if len(text) <= _SHORT and "(*" not in text else section[0]
+
+        return re.sub(r"^VAR.*?^END_VAR$", joined, self.declaration, flags=re.MULTILINE | re.DOTALL)
+
+    def body(self) -> list[str]:
+        """Return the statements with short branches and loops on one line: only spaces differ."""
+        begin, end = r"(?:IF|FOR|WHILE)\b.*(?:THEN|DO)", r"END_(?:IF|FOR|WHILE);"
+        return compact(self.statements.rstrip("\n").split("\n"), begin, "ELSE", end)
 
 
 def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
@@ -140,45 +162,44 @@ def translate(tables: Tables, name: str, dialect: Dialect) -> list[SourceUnit]:
         used = used.replace("#", "")
     units = [SourceUnit(f"{name}_{word}", write_type(tables, name, bag, used, dialect)) for bag, word in BAGS.items()]
     units += [SourceUnit(n, head, body, "END_FUNCTION") for n, (head, body) in functions.items()]
-    return [*units, _start(tables, name, used, scl), _check(tables, name, used, scl), _block(tables, name, scl)]
+    return [*units, _start(tables, name, scl), _check(tables, name, used, scl), _block(tables, name, scl)]
 
 
-def _start(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
+def _start(tables: Tables, name: str, scl: bool) -> SourceUnit:
     """Return the function that starts the compensator; the corrections in force may be kept as the starting point."""
-    mark = "#" if scl else ""
-    lines = []
-    for n, var in used_in("s", used).items():
-        value = f"{mark}known" if n == "referenced" else number(0, var.kind)
-        own = [f"{mark}s.{safe(n)} := {value};"]
-        if var.dims:
-            own = _each(var, tables, mark, [f"{mark}s.{safe(n)}[{mark}k] := {value};"])
-        kept = n in ("correction", "slope")
-        lines += [f"IF NOT {mark}keep THEN", *(f"    {line}" for line in own), "END_IF;"] if kept else own
+    m = "#" if scl else ""
+    lines = [f"FOR {m}k := 0 TO {len(tables.targets) - 1} DO"]
+    for n in ("correction", "slope"):
+        kept = f"{m}s.{n}[{m}k]"
+        chosen = f"SEL(G := {m}keep, IN0 := 0.0, IN1 := {kept})" if scl else f"SEL({m}keep, 0.0, {kept})"
+        lines.append(f"    {m}none.{n}[{m}k] := {chosen};")
+    lines += [f"    {m}none.referenced[{m}k] := {m}known;", "END_FOR;", f"{m}s := {m}none;"]
     about = "Start with a known reference or not; the next temperatures become the zero. Corrections may be kept."
     given = {"known": "BOOL", "keep": "BOOL"}
-    return _function(name, "start", "Void" if scl else "BOOL", about, given, lines, scl)
+    return _function(name, "start", "Void" if scl else "BOOL", about, given, lines, scl, also=("none",))
 
 
 def _check(tables: Tables, name: str, used: str, scl: bool) -> SourceUnit:
     """Return the function that computes the check value of a state."""
-    mark = "#" if scl else ""
-    total, lines = f"{mark}total", [f"{mark}total := 0.0;"]
+    mark, sizes = "#" if scl else "", dict[int, list[str]]()
     for n, var in used_in("s", used).items():
-        if n in ("model", "checked"):
-            continue
-        value = f"{mark}s.{safe(n)}[{mark}k]" if var.dims else f"{mark}s.{safe(n)}"
-        own = [f"{total} := {total} * 0.999 + {f'DINT_TO_LREAL({value})' if var.kind == 'int' else value};"]
-        if var.kind == "bool":
-            own = [f"{total} := {total} * 0.999;", f"IF {value} THEN", f"    {total} := {total} + 1.0;", "END_IF;"]
-        lines += _each(var, tables, mark, own) if var.dims else own
+        value = f"{mark}s.{safe(n)}{f'[{mark}k]' if var.dims else ''}"
+        if var.kind == "int":
+            value = f"DINT_TO_LREAL({value})"
+        elif var.kind == "bool":
+            value = f"SEL(G := {value}, IN0 := 0.0, IN1 := 1.0)" if scl else f"SEL({value}, 0.0, 1.0)"
+        if n not in ("model", "checked"):
+            sizes.setdefault(size_of(var, tables.sizes) if var.dims else 0, []).append(value)
+    total = f"{mark}total"
+    lines = [f"{total} := 0.0;"]
+    for size, values in sizes.items():
+        sums = [
+            f"{total} := {total} * 0.999 + {' + '.join(f'{f}{v}' for f, v in zip(_FACTORS, three, strict=False))};"
+            for three in (values[k : k + 3] for k in range(0, len(values), 3))
+        ]
+        lines += [f"FOR {mark}k := 0 TO {size - 1} DO", *(f"    {x}" for x in sums), "END_FOR;"] if size else sums
     lines.append(f"{mark}{name}_sum := {total};")
     return _function(name, "sum", "LREAL", "Return the check value of a state.", {}, lines, scl, {"total": "LREAL"})
-
-
-def _each(var: Var, tables: Tables, mark: str, lines: Sequence[str]) -> list[str]:
-    """Return statements for every element of an array, whose index is k."""
-    last = size_of(var, tables.sizes) - 1
-    return [f"FOR {mark}k := 0 TO {last} DO", *(f"    {line}" for line in lines), "END_FOR;"]
 
 
 def _function(
@@ -190,10 +211,14 @@ def _function(
     lines: Sequence[str],
     scl: bool,
     own: Mapping[str, str] = MappingProxyType({}),
+    also: Sequence[str] = (),
 ) -> SourceUnit:
-    """Return a function of a state."""
+    """Return a function of a state, and of others of its type."""
     parts = [f"FUNCTION {quoted(f'{name}_{word}', scl)} : {gives}", *(SCL if scl else []), f"(* {about} *)"]
-    parts += [section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)}), section("VAR_INPUT", given)]
+    parts += [
+        section("VAR_IN_OUT", dict.fromkeys(("s", *also), quoted(f"{name}_state", scl))),
+        section("VAR_INPUT", given),
+    ]
     parts += [section("VAR_TEMP" if scl else "VAR", {"k": "DINT", **own})]
     return SourceUnit(f"{name}_{word}", "\n".join(filter(None, parts)), "\n".join(lines), "END_FUNCTION")
 
@@ -221,10 +246,12 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
             {o: array(kinds.get(o, "int"), n) if n else TYPES[kinds.get(o, "int")] for o, n in outputs.items()},
         ),
         section("VAR_IN_OUT", {"kept": quoted(f"{name}_state", scl)}),
-        section("VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in BAGS.items()}, **_OWN}),
+        section(
+            "VAR", {**{bag: quoted(f"{name}_{word}", scl) for bag, word in (*BAGS.items(), ("none", "state"))}, **_OWN}
+        ),
         section("VAR_TEMP" if scl else "VAR", {"k": "DINT", "unknown": "BOOL"}),
     ]
-    names = ("w", "t", "k", "unknown", "kept", "value", "good", *INPUTS, *_OWN)
+    names = ("w", "t", "k", "none", "unknown", "kept", "value", "good", *INPUTS, *_OWN)
     calls = {"start": "start", "check": "sum", "power_up": "power_up", "order": "rezero", "step": "step"}
     body = _BODY.format(
         **{v: f"{mark}{v}" for v in names},
@@ -249,10 +276,3 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
 
 def _listed(names: Sequence[str]) -> str:
     return "; ".join(f"{k}: {n}" for k, n in enumerate(names))
-
-
-def comment(text: str) -> str:
-    """Return a text in which nothing ends a comment of structured text."""
-    for sign in ("*)", "(*", "]]>"):
-        text = text.replace(sign, " ".join(sign))
-    return " ".join(text.split())

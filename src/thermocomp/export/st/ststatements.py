@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
 from thermocomp.runtime.program import tree as n
-from thermocomp.runtime.program.assembly import functions, used_locals
+from thermocomp.runtime.program.assembly import functions, grouped_locals
 from thermocomp.runtime.program.declarations import Var
-from thermocomp.runtime.program.printer import Printer, written
+from thermocomp.runtime.program.printer import Printer, label_columns, label_rows, written
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Function, Kind, Operator
 from thermocomp.runtime.program.variables import RECORDS
@@ -80,14 +80,14 @@ class _Writer(Printer):
         dialect: Dialect,
         others: Mapping[str, Mapping[str, Kind]],
     ) -> None:
-        super().__init__(function, tables.sizes)
+        super().__init__(function, tables.sizes, _labels(tables))
         self._name, self._scl, self._others = name, dialect == "scl", others
 
     def text(self) -> tuple[str, str]:
         f = self.function
         given = {p: TYPES[kind] for p, kind in f.parameters.items()}
         bags = {} if f.is_of_numbers else {v: quoted(f"{self._name}_{b}", self._scl) for v, b in BAGS.items()}
-        own = {v: TYPES[kind] for v, kind in used_locals(f).items()}
+        own = {", ".join(map(safe, names)): kind for kind, names in grouped_locals(f, TYPES).items()}
         gives = "LREAL" if f.is_of_numbers else "Void" if self._scl else "BOOL"
         head = f"FUNCTION {quoted(f'{self._name}_{f.name}', self._scl)} : {gives}"
         parts = [head, *(SCL if self._scl else []), f"(* {f.about} *)"]
@@ -101,7 +101,8 @@ class _Writer(Printer):
             case n.Assign(target, n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Assign(target, one)], [n.Assign(target, other)]), depth)
             case n.Assign(target, value):
-                return [f"{pad}{self.value(target)} := {self.bare(value)};"]
+                about = f" (* {said} *)" if (said := self.about(target)) else ""
+                return [f"{pad}{self.value(target)} := {self.bare(value)};{about}"]
             case n.Return(n.Conditional(_, test, one, other)):
                 return self.statement(n.If(test, [n.Return(one)], [n.Return(other)]), depth)
             case n.Return(value):
@@ -175,7 +176,7 @@ def quoted(name: str, scl: bool) -> str:
 
 def section(word: str, variables: Mapping[str, str]) -> str:
     """Return a section of declarations; empty without variables."""
-    lines = [f"    {safe(name)} : {what};" for name, what in variables.items()]
+    lines = [wrapped(f"    {safe(name)} : {what};") for name, what in variables.items()]
     return "\n".join([word, *lines, "END_VAR"]) if lines else ""
 
 
@@ -198,18 +199,46 @@ def wrapped(line: str) -> str:
     return textwrap.fill(line, 110, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
+def comment(text: str) -> str:
+    """Return a text in which nothing ends a comment of structured text."""
+    for sign in ("*)", "(*", "]]>"):
+        text = text.replace(sign, " ".join(sign))
+    return " ".join(text.split())
+
+
+def _labels(tables: Tables) -> dict[str, list[str]]:
+    return {dim: [comment(name).replace(";", ",") for name in names] for dim, names in tables.labels.items()}
+
+
 def write_type(tables: Tables, name: str, bag: str, used: str, dialect: Dialect) -> str:
     """Return the type of a structure: the variables used in a text, with the values of constants."""
     scl = dialect == "scl"
     lines = [f"TYPE {quoted(f'{name}_{BAGS[bag]}', scl)}{'' if scl else ' :'}"]
     lines += SCL[1:] if scl else []
     lines += ["STRUCT"]
+    labels = _labels(tables)
     for name_, var in used_in(bag, used).items():
         size = size_of(var, tables.sizes)
-        what = array(var.kind, size) if var.dims else TYPES[var.kind]
-        start = f" := {values(tables.values[name_], var.kind)}" if bag == "t" else ""
-        lines += [wrapped(f"    {safe(name_)} : {what}{start};"), f"    (* {var.about} *)"]
+        text = f"    {safe(name_)} : {array(var.kind, size) if var.dims else TYPES[var.kind]}"
+        if bag == "t":
+            found = tables.values[name_]
+            rows = _rows(found, var, labels) if var.dims and var.dims[0] in labels and found else []
+            about = [f"    (* {var.about}{label_columns(var, labels)} *)"]
+            lines += [wrapped(line) for line in about]
+            lines += [f"{text} := [", *rows] if rows else [wrapped(f"{text} := {values(found, var.kind)};")]
+        else:
+            lines.append(wrapped(f"{text}; (* {var.about} *)"))
     return "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"])
+
+
+def _rows(found: list[Any], var: Var, labels: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the initial values of an array, with a comment at each row of the table."""
+    rows, lines = label_rows(found, var.dims, labels), list[str]()
+    for k, (name, value) in enumerate(rows):
+        text = f"        {', '.join(written(value, lambda v: number(v, var.kind)))}{',' if k < len(rows) - 1 else '];'}"
+        one = f"{text} (* {name} *)"
+        lines += [one] if len(one) < 120 and text.endswith(",") else [f"        (* {name} *)", wrapped(text)]
+    return lines
 
 
 def used_in(bag: str, used: str) -> dict[str, Var]:

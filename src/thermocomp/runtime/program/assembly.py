@@ -39,10 +39,14 @@ def functions(tables: Tables, own: Mapping[str, str] = MappingProxyType({})) -> 
     return list(found.values())
 
 
-def used_locals(function: Function) -> dict[str, Kind]:
-    """Return the local variables that the statements of a function use, in order of appearance."""
+def grouped_locals(function: Function, types: Mapping[Kind, str]) -> dict[str, list[str]]:
+    """Return the names of the local variables that the statements of a function use, by their type."""
     names = dict.fromkeys(node.name for node in walk(function.body) if isinstance(node, Name) and not node.record)
-    return {name: function.locals[name] for name in names if name in function.locals}
+    found: dict[str, list[str]] = {}
+    for name in names:
+        if name in function.locals:
+            found.setdefault(types[function.locals[name]], []).append(name)
+    return found
 
 
 def _decided(body: list[Statement], sizes: Mapping[str, int]) -> list[Statement]:

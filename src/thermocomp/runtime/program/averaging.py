@@ -25,32 +25,12 @@ class Averaged(NamedTuple):
     @classmethod
     def of_models(cls, s: Kept) -> "Averaged":
         """Return the mean for the zero of the models."""
-        return cls(
-            readings=s.zero_readings,
-            resting=s.zero_resting,
-            first=s.zero_first,
-            last=s.zero_last,
-            before_at=s.zero_before_at,
-            weight=s.zero_weight,
-            mean=s.zero_mean,
-            before=s.zero_before,
-            previous=s.zero_previous,
-        )
+        return cls(**{name: getattr(s, f"zero_{name}") for name in cls._fields})
 
     @classmethod
     def of_watch(cls, s: Kept) -> "Averaged":
         """Return the mean for the zero of the watch."""
-        return cls(
-            readings=s.watch_readings,
-            resting=s.watch_resting,
-            first=s.watch_first,
-            last=s.watch_last,
-            before_at=s.watch_before_at,
-            weight=s.watch_weight,
-            mean=s.watch_mean,
-            before=s.watch_before,
-            previous=s.watch_previous,
-        )
+        return cls(**{name: getattr(s, f"watch_{name}") for name in cls._fields})
 
     def belongs(self, w: Work, t: Constants) -> Condition:
         """Record whether the reading belongs to the averaging interval, in a local variable."""

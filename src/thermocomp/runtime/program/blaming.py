@@ -45,13 +45,7 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
         fail(s, w, t)
         with when(~swapped):
             fail_stuck(s, w, t)
-        for i in each("i", t.SENSORS):
-            w.able[i] = w.able[i] & ~s.has_jumped[i]
-            w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
-        for c in each("c", t.CHECKS):
-            trusted = s.fault[t.speed_fault[t.check_speed[c]]].equals(GOOD)
-            w.weighed[t.SENSORS + c] = choose(trusted, s.heat[c] - s.estimate[c], 0.0)
-        weigh_one(s, w, t, t.RESIDUALS)
+        weigh_rest(s, w, t)
         sure = let("sure", w.lasting & ~swapped & ~alone)
         with when(t.supervised):
             heating.weigh_speeds(s, w, t)
@@ -66,6 +60,18 @@ def blame(s: Kept, w: Work, t: Constants, elapsed: Number) -> None:
                 w.onset[i] = 0.0
             w.new_fault = UNEXPLAINED
             fail(s, w, t)
+
+
+@procedure
+def weigh_rest(s: Kept, w: Work, t: Constants) -> None:
+    """Find the sensor that explains most of the differences of those without a jump, and of the heats."""
+    for i in each("i", t.SENSORS):
+        w.able[i] = w.able[i] & ~s.has_jumped[i]
+        w.weighed[i] = choose(w.able[i], w.x[i] - s.predicted[i], 0.0)
+    for c in each("c", t.CHECKS):
+        trusted = s.fault[t.speed_fault[t.check_speed[c]]].equals(GOOD)
+        w.weighed[t.SENSORS + c] = choose(trusted, s.heat[c] - s.estimate[c], 0.0)
+    weigh_one(s, w, t, t.RESIDUALS)
 
 
 @procedure

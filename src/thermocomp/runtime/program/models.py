@@ -10,6 +10,7 @@ from thermocomp.core import expression as e
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.recurrences import Clock
+from thermocomp.runtime.program.banks import TableBank, join, stripped
 from thermocomp.runtime.program.clocks import run_clock
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
@@ -35,38 +36,37 @@ class Formulas:
         Inputs of the models, without duplicates.
     channels : sequence of int
         Index of each input among the values of a reading.
+    models : sequence of ErrorModel
     """
 
-    def __init__(self, ranges: Sequence[Input], channels: Sequence[int]) -> None:
+    def __init__(self, ranges: Sequence[Input], channels: Sequence[int], models: Sequence[ErrorModel]) -> None:
         self.channels = channels
         self._supports = Supports(ranges)
-        self.lags = 0
+        self.nodes = {k: formula(m, tuple(ranges)) for k, m in enumerate(models)}
+        self.banks = list[TableBank]()
+        groups = {
+            name: [(k, m) for k, m in enumerate(models) if any(i.rezero for i in m.inputs) == rezeroed]
+            for name, rezeroed in (("absolute", False), ("rezeroed", True))
+        }
+        for group in groups.values():
+            self.banks.append(TableBank([self.nodes[k] for k, _ in group], self.banks))
+        self.lags = sum(len(b.lags) for b in self.banks)
         self.clocks: list[_Clock] = []
         self.x, self.y = list[float](), list[float]()
         self.functions: dict[str, Function] = {}  #: by name
+        for (name, group), bank in zip(groups.items(), self.banks, strict=True):
+            self._add(name, group, bank)
 
-    def add(self, name: str, models: Iterable[tuple[int, ErrorModel, e.Node]]) -> None:
-        """Record a function that computes the outputs of models.
-
-        Parameters
-        ----------
-        name : str
-            Name of the function; ``models_`` is prefixed.
-        models : iterable of (int, ErrorModel, Node)
-            Index, model and formula; the inputs of a formula are numbered like the ranges.
-        """
+    def _add(self, name: str, models: Iterable[tuple[int, ErrorModel]], bank: TableBank) -> None:
+        """Record the function that computes the outputs of models."""
         s = Kept()
+        begun = s.begun_absolute if name == "absolute" else s.begun_rezeroed
         with record(f"models_{name}") as self.functions[f"models_{name}"]:
-            formula, worked_out = (
-                _Formula(self, s.begun_absolute if name == "absolute" else s.begun_rezeroed),
-                set[int](),
-            )
-            for place, model, node in models:
-                self._supports.record(model, place, formula.value(node), worked_out)
-            if name == "absolute":
-                s.begun_absolute = True
-            else:
-                s.begun_rezeroed = True
+            values, worked_out = _Formula(self, bank, begun), set[int]()
+            bank.record(begun, values.store)
+            for place, model in models:
+                self._supports.record(model, place, values.value(self.nodes[place]), worked_out)
+            begun.set(True)
 
     def finish(self) -> tuple[dict[str, int], dict[str, list[Any]]]:
         """Record the last function; return all sizes and numbers that the functions need."""
@@ -77,7 +77,8 @@ class Formulas:
                     w.next = _Ticking(clock).value(clock.tick)
         sizes, values = self._supports.finish()
         clocks = self.clocks
-        sizes |= {
+        own_sizes, own_values = join(self.banks)
+        sizes |= own_sizes | {
             "LAGS": self.lags,
             "CLOCKS": len(clocks),
             "ENDS_OF_CLOCKS": len(clocks) + 1,
@@ -86,7 +87,7 @@ class Formulas:
             "AVERAGES": sum(c.means * len(c.leaves) for c in clocks),
             "POINTS_OF_TABLES": len(self.x),
         }
-        values |= {
+        values |= own_values | {
             "interval": [c.interval for c in clocks],
             "past_begin": [c.past_begin for c in clocks] + [sizes["PASTS"]],
             "leaf_begin": [c.leaf_begin for c in clocks] + [sizes["LEAVES"]],
@@ -95,6 +96,13 @@ class Formulas:
             "table_y": self.y,
         }
         return sizes, values
+
+
+def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> e.Node:
+    """Return the formula of a model, with its inputs numbered like the ranges."""
+    low, high, _ = model.bounds
+    leaves = (e.Input(ranges.index(i), i.name) for i in model.inputs)
+    return model.expression([e.Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
 
 
 def name_value(node: e.Node) -> str:
@@ -131,14 +139,20 @@ class _Arithmetic:
 
     def value(self, node: e.Node) -> Number:
         """Return the value of an expression's node, computed once."""
-        if isinstance(node, e.Named):
-            return self.value(node.of)
+        node = stripped(node)
         if isinstance(node, e.Constant):
             return real(node.value)
         if (known := self._known.get(node)) is None:
             found = self._found(node)
             known = self._known[node] = let(self._new_name(node), found)
         return known
+
+    def _term(self, node: e.Node) -> Number:
+        """Return the value of a term of a sum; a weighted value has no variable of its own."""
+        match stripped(node):
+            case e.Product((e.Constant(weight), of)):
+                return weight * self.value(of)
+        return self.value(node)
 
     def _new_name(self, node: e.Node) -> str:
         """Return a new name of a variable: that of the sensor and the operation if there is one, otherwise a number."""
@@ -155,7 +169,7 @@ class _Arithmetic:
             case e.Clip(of, low, high):
                 return clip(self.value(of), real(low), real(high))
             case e.Sum(terms):
-                return reduce(add, map(self.value, terms)) if terms else real(0.0)
+                return reduce(add, map(self._term, terms)) if terms else real(0.0)
             case e.Difference(of, minus):
                 return self.value(of) - self.value(minus)
             case e.Product(factors):
@@ -174,10 +188,20 @@ class _Arithmetic:
 class _Formula(_Arithmetic):
     """Formula of models, with lags, tables and values updated at fixed intervals."""
 
-    def __init__(self, formulas: Formulas, begun: Condition) -> None:
+    def __init__(self, formulas: Formulas, bank: TableBank, begun: Condition) -> None:
         super().__init__()
-        self._formulas, self._begun = formulas, begun
+        self._formulas, self._bank, self._begun = formulas, bank, begun
+        w = Work()
+        self._known |= {n: w.term[bank.places[n]] for n in (*bank.inputs, *bank.lags)}
+        self._known |= {n: w.total[k] for n, k in zip(bank.sums, bank.rows["sums"], strict=True)}
         self._gains: dict[Expression, Number] = {}
+
+    def store(self, nodes: Iterable[e.Node]) -> None:
+        """Record the values of nodes as terms of the bank."""
+        for node in nodes:
+            term = Work().term[self._bank.places[node]]
+            term.set(self.value(node) if node in self._known or isinstance(node, e.Constant) else self._found(node))
+            self._known[node] = term
 
     def _found(self, node: e.Node) -> Number:
         own, s, w, t = self._formulas, Kept(), Work(), Constants()

@@ -185,11 +185,7 @@ def gather(s: Kept, w: Work, t: Constants) -> None:
         averaged.add(w, t.CHANNELS, lambda c: w.value[c])
     s.known = ~belongs | averaged.complete(t)
     with when(s.known):
-        for r in each("r", t.RANGES):
-            with when(t.rezero[r]):
-                s.zero[r] = s.zero_mean[t.channel[r]]
-        for c in each("c", t.CHANNELS):
-            w.input[c] = s.zero_mean[c]
+        take_zero(s, w, t)
         last = let("last", w.step)
         with when(waited):
             w.step = 0.0
@@ -201,6 +197,16 @@ def gather(s: Kept, w: Work, t: Constants) -> None:
         with when(~belongs):
             for c in each("c", t.CHANNELS):
                 w.input[c] = w.value[c]
+
+
+@procedure
+def take_zero(s: Kept, w: Work, t: Constants) -> None:
+    """Take the mean readings as the zero of the inputs, and as the inputs."""
+    for r in each("r", t.RANGES):
+        with when(t.rezero[r]):
+            s.zero[r] = s.zero_mean[t.channel[r]]
+    for c in each("c", t.CHANNELS):
+        w.input[c] = s.zero_mean[c]
 
 
 @procedure

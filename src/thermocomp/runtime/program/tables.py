@@ -8,67 +8,24 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError
-from thermocomp.core.expression import Clip, Node
-from thermocomp.core.expression import Input as Leaf
 from thermocomp.core.inputs import Input
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.starting import find_start_span
-from thermocomp.core.thresholds import Thresholds
+from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import find_cold_after
+from thermocomp.runtime.program.labels import Labels, label_all
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
-from thermocomp.runtime.program.variables import Kept
+from thermocomp.runtime.program.variables import Constants, Kept
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
 #: limits
 OF_LIMITS = ("magnitude", "rate", "dead_band", "reading_age", "hold", "fade")
-#: thresholds of gate, feed and power-up
-OF_GATE = (
-    "stopped_speed",
-    "clock_skew",
-    "zero_change",
-    "resumable",
-    "repeat_factor",
-    "repeat_margin",
-    "repeat_wait",
-    "repeat_changes",
-    "repeat_memory",
-    "repeat_moved",
-)
-#: thresholds that only the watch needs, and those it has in common with the gate
-OF_WATCH = (
-    "least_temperature",
-    "most_temperature",
-    "most_speed",
-    "zero_change",
-    "stopped_speed",
-    "check_interval",
-    "fault_duration",
-    "return_time",
-    "substitute_fade",
-    "fault_rest",
-    "heat_factor",
-    "fast_factor",
-    "difference_time",
-    "swap_evidence",
-    "least_share",
-    "more_heat",
-    "more_stored",
-    "heat_stored",
-    "untrained_heat",
-    "speed_doubt",
-    "less_heat",
-    "agree_moved",
-    "speed_return",
-    "swap_preferred",
-    "swap_certain",
-    "unknown_step",
-    "same_moved",
-    "speed_preferred",
-)
+#: thresholds that the program uses
+OF_THRESHOLDS = tuple(row.name for row in THRESHOLDS.rows if row.name in Constants.variables())
 
 
 class Tables(NamedTuple):
@@ -84,6 +41,7 @@ class Tables(NamedTuple):
         str, Any
     ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Constants`
     formulas: dict[str, Function]  #: functions generated from the models' formulas
+    labels: Labels  #: of the rows and columns of the values, by the name of their size
 
 
 def gather(compensator: Compensator) -> Tables:
@@ -128,10 +86,7 @@ def gather(compensator: Compensator) -> Tables:
         **_judged(models, sensors),
         **_watch(watch, place),
     }
-    formulas = Formulas(ranges, values["channel"])
-    for name, waits in (("absolute", False), ("rezeroed", True)):
-        mine = [(k, m) for k, m in enumerate(models) if values["model_rezeroed"][k] == waits]
-        formulas.add(name, [(k, m, formula(m, ranges)) for k, m in mine])
+    formulas = Formulas(ranges, values["channel"], models)
     own_sizes, own_values = formulas.finish()
     values |= own_values
     sizes = {
@@ -156,6 +111,7 @@ def gather(compensator: Compensator) -> Tables:
         sizes=sizes,
         values=values | {"fingerprint": _fingerprint(values, formulas.functions)},
         formulas=formulas.functions,
+        labels=label_all(compensator, channels, ranges, values, formulas),
     )
 
 
@@ -189,13 +145,6 @@ def _sizes(values: dict[str, Any]) -> dict[str, int]:
     }
 
 
-def formula(model: ErrorModel, ranges: tuple[Input, ...]) -> Node:
-    """Return the formula of a model, with its inputs numbered like the ranges."""
-    low, high, _ = model.bounds
-    leaves = (Leaf(ranges.index(i), i.name) for i in model.inputs)
-    return model.expression([Clip(*clip) for clip in zip(leaves, low, high, strict=True)])
-
-
 def _ranges(
     ranges: tuple[Input, ...], models: tuple[ErrorModel, ...], place: dict[str, int], thresholds: Thresholds
 ) -> dict[str, Any]:
@@ -211,7 +160,7 @@ def _ranges(
             bounds[i].append((a, b))
     at_once = {i for m in models if not any(i.rezero for i in m.inputs) for i in m.inputs}
     return {
-        **{name: getattr(thresholds, name) for name in OF_GATE},
+        **{name: getattr(thresholds, name) for name in OF_THRESHOLDS},
         "channel": [place[r.name] for r in ranges],
         "temperature": heat,
         "rezero": [r.rezero for r in ranges],
@@ -352,7 +301,7 @@ def _watch(watch: Watch | None, place: dict[str, int]) -> dict[str, Any]:
         "sensor_span": [max(w, watch.thresholds.least_margin) for w in width],
         "speed_input": watch.speeds.tolist(),
         "top_speed": watch.top_speed,
-        **{name: getattr(watch.thresholds, name) for name in OF_WATCH},
+        **{name: getattr(watch.thresholds, name) for name in OF_THRESHOLDS},
         "pace": watch.pace,
         "tau": list(watch.time_constants),
         "state_input": bank.speeds.tolist(),

@@ -95,7 +95,7 @@ def make_up(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def begin(s: Kept, w: Work, t: Constants) -> None:
-    """Add a reading to the zero if it is unknown; start from rest at the zero, or at the first reading."""
+    """Add a reading to the zero of the watch if it is unknown; start at the zero, or at the first reading."""
     averaged = Averaged.of_watch(s)
     ready = let("ready", ~t.watch_waits)
     with when(t.watch_waits):
@@ -104,29 +104,35 @@ def begin(s: Kept, w: Work, t: Constants) -> None:
             averaged.add(w, t.WATCHED, lambda k: w.value[t.watch_channel[k]])
         ready.set(~belongs | averaged.complete(t))
     with when(ready):
-        for k in each("k", t.WATCHED):
-            w.middle = w.value[t.watch_channel[k]]
-            with when(t.watch_waits):
-                w.middle = s.watch_mean[k]
-            s.watch_zero[k] = choose(t.watch_rezero[k], w.middle, t.watch_reference[k])
-            w.change[k] = w.middle - s.watch_zero[k]
+        start_watch(s, w, t)
+
+
+@procedure
+def start_watch(s: Kept, w: Work, t: Constants) -> None:
+    """Start the watch from rest at its zero."""
+    for k in each("k", t.WATCHED):
+        w.middle = w.value[t.watch_channel[k]]
+        with when(t.watch_waits):
+            w.middle = s.watch_mean[k]
+        s.watch_zero[k] = choose(t.watch_rezero[k], w.middle, t.watch_reference[k])
+        w.change[k] = w.middle - s.watch_zero[k]
+    for i in each("i", t.SENSORS):
+        s.used[i] = w.change[t.sensor_input[i]]
+        s.still[i] = w.now
+        s.step[i] = NONE
+    for k in each("k", t.SPEEDS):
+        w.speed[k] = w.change[t.speed_input[k]] + s.watch_zero[t.speed_input[k]]
+    calm_down(s, w, t)
+    for k in each("k", t.TAUS):
         for i in each("i", t.SENSORS):
-            s.used[i] = w.change[t.sensor_input[i]]
-            s.still[i] = w.now
-            s.step[i] = NONE
-        for k in each("k", t.SPEEDS):
-            w.speed[k] = w.change[t.speed_input[k]] + s.watch_zero[t.speed_input[k]]
-        calm_down(s, w, t)
-        for k in each("k", t.TAUS):
-            for i in each("i", t.SENSORS):
-                s.memory[k * t.SENSORS + i] = s.used[i]
-        for k in each("k", t.STATES):
-            s.memory[t.LAGGED + k] = raised(abs(w.change[t.state_input[k]]) / t.top_speed, t.power[k])
-        predict(s, w, t)
-        with when(t.supervised):
-            heating.begin_heats(s, w, t)
-        s.looked = True
-        s.look = w.now
+            s.memory[k * t.SENSORS + i] = s.used[i]
+    for k in each("k", t.STATES):
+        s.memory[t.LAGGED + k] = raised(abs(w.change[t.state_input[k]]) / t.top_speed, t.power[k])
+    predict(s, w, t)
+    with when(t.supervised):
+        heating.begin_heats(s, w, t)
+    s.looked = True
+    s.look = w.now
 
 
 @procedure
