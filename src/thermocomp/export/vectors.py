@@ -1,7 +1,7 @@
 """Test vectors: readings, including faulty ones, and the compensator's response to each."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, NamedTuple
 
@@ -63,6 +63,9 @@ class Answers(NamedTuple):
     fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watch.WORDS`
     passed: NDArray[np.bool_]  #: (n_calls,), whether the reading was used
     warm: NDArray[np.bool_]  #: (n_calls,), whether the machine seemed warm at its start
+    why: IntArray = np.zeros(0, dtype=int)  #: (n_calls,), why the reading was not used: the block's ``rejected``
+    outside: IntArray = np.zeros(0, dtype=int)  #: (n_calls,), number of inputs beyond the trained range
+    inner: FloatArray = np.zeros(0)  #: (n_calls,), check value of the state of the monitoring, see `INNER`
 
 
 def replay(
@@ -75,14 +78,14 @@ def replay(
     """Replay readings through a compensator from its power-up without a state, and return its outputs."""
     names, targets = [c.name for c in tables.channels], tables.targets
     state, clock, begun, rows = power_up(compensator, None, math.nan), 0.0, False, []
-    warm, waiting, resumed = False, dict[str, float](), set[str]()
+    warm, waiting, resumed, outside = False, dict[str, float](), set[str](), 0
     for *values, age, dt, counter, event, amount in readings.columns.tolist():
         if REZERO <= event < REZERO + len(targets):
             waiting[targets[int(event) - REZERO]] = amount
         elif NOTHING < event < REZERO:
             state = _begin(compensator, state, int(event), amount)
             clock, begun = state.clock or 0.0, state.clock is not None
-            waiting, warm = (waiting, warm) if begun else ({}, False)
+            waiting, warm, outside = (waiting, warm, outside) if begun else ({}, False, 0)
             resumed = set(targets) if begun and amount > compensator.limits.hold else resumed if begun else set()
         good = 0.0 <= dt <= GAP
         clock, begun = clock + dt if good and begun else clock, begun or good
@@ -94,8 +97,9 @@ def replay(
         state, said = take_at_once(compensator, before, state, said, resumed)
         waits = {t for t, idle in state.idle.items() if idle <= compensator.limits.reading_age}
         resumed = {t for t in resumed & waits if said.states[t].word == "holding"}
-        if starting and not said.rejected:
-            warm = machine_seems_warm(compensator, state)
+        if not said.rejected:
+            outside = _count_outside(tables, state)
+            warm = machine_seems_warm(compensator, state) if starting else warm
         for target in [t for t in waiting if t in state.raw]:
             state = rezero_measured(compensator, state, target, clock, waiting.pop(target))
         if rounded is not None:
@@ -110,6 +114,9 @@ def replay(
                 [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors],
                 not said.rejected,
                 warm,
+                _rejected(said.rejected),
+                outside,
+                _check_inner(state),
             )
         )
 
@@ -125,7 +132,55 @@ def replay(
         fault=table(4).astype(int),
         passed=passed,
         warm=seemed,
+        why=table(7)[:, 0].astype(int),
+        outside=table(8)[:, 0].astype(int),
+        inner=table(9)[:, 0],
     )
+
+
+def _rejected(why: str) -> int:
+    """Return the block's number of a reason: 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped."""
+    if not why:
+        return 0
+    if why.endswith("the source has stopped"):
+        return 4
+    if "plausible as a start" in why:
+        return 3
+    return 2 if why.endswith((" is missing", " is not plausible")) else 1
+
+
+def _count_outside(tables: Tables, state: CompensatorState) -> int:
+    """Return the number of inputs beyond the range of a model."""
+    pairs = zip(tables.models, state.models, strict=True)
+    return len({i for m, own in pairs for i, out in zip(m.inputs, own.outside.tolist(), strict=True) if out})
+
+
+#: variables of the monitoring, part of a check value of the state: `add_up`
+INNER = (
+    *("memory", "traces", "used", "predicted", "usual", "step", "has_jumped", "is_off", "is_moving", "is_back"),
+    *("cleared", "evidence", "heat", "stored", "estimate", "estimated", "is_wrong", "is_doubtful", "does_agree"),
+)
+
+
+def _check_inner(state: CompensatorState) -> float:
+    """Return the check value of the state of the monitoring; evidence counts for pairs that are not cleared."""
+    if not state.watches or math.isnan(state.watches[0].time):
+        return 0.0
+    (s,) = state.watches
+    cleared, began = np.isneginf(s.evidence), [s.jumped, s.off, s.moving, s.back, s.heat.since, s.heat.doubt, s.heat.back]
+    jumped, off, moving, back, wrong, doubtful, agree = (~np.isnan(a) for a in began)
+    heat = (s.heat.heat, s.heat.stored, s.heat.estimate, s.heat.states)
+    kept = (s.memory, s.traces, s.used, s.predicted, s.usual, s.step, jumped, off, moving, back, cleared)
+    return add_up([*kept, np.where(cleared, 0.0, s.evidence), *heat, wrong, doubtful, agree])
+
+
+def add_up(numbers: Iterable[Any]) -> float:
+    """Return a check value of lists of numbers: the sum of the index from 1, times the logarithm of the size."""
+    total = 0.0
+    for values in numbers:
+        x = np.ravel(np.asarray(values, dtype=np.float64))
+        total += float(np.sum(np.arange(1.0, len(x) + 1.0) * np.sign(x) * np.log1p(1e4 * np.minimum(np.abs(x), 1e13))))
+    return total
 
 
 def _begin(compensator: Compensator, state: CompensatorState, event: int, amount: float) -> CompensatorState:

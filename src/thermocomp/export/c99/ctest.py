@@ -5,8 +5,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from thermocomp.export.vectors import Answers, Readings
+from thermocomp.export.vectors import INNER, Answers, Readings
 from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.variables import Kept
 
 _PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 #include "{name}.h"
@@ -36,11 +37,11 @@ static const double wanted[CALLS][2 * TARGETS] = {{
 {wanted}
 }};
 
-/* status by target, fault by sensor, whether the reading was used, whether the machine seemed warm */
-static const int told[CALLS][TARGETS + SENSORS + 2] = {{
+/* status by target, fault by sensor, why the reading was not used, inputs beyond the trained range, machine warm */
+static const int told[CALLS][TARGETS + SENSORS + 3] = {{
 {told}
 }};
-
+{inner}
 static double worst;
 
 static int off(double value, double want)
@@ -80,7 +81,8 @@ int main(void)
         }}
         happen(&s, (int)given[k][INPUTS + 3], given[k][INPUTS + 4]);
         {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
-        wrong = (s.rejected == 0) != told[k][TARGETS + SENSORS] || s.warm != told[k][TARGETS + SENSORS + 1];
+        wrong = s.rejected != told[k][TARGETS + SENSORS] || s.outside != told[k][TARGETS + SENSORS + 1];
+        wrong |= s.warm != told[k][TARGETS + SENSORS + 2];
         for (j = 0; j < TARGETS; j++) {{
             wrong |= off((double)s.correction[j], wanted[k][2 * j]);
             wrong |= off((double)s.slope[j], wanted[k][2 * j + 1]);
@@ -101,6 +103,35 @@ int main(void)
 _FAULTS = """        for (j = 0; j < SENSORS; j++) {
             wrong |= s.fault[j] != told[k][TARGETS + j];
         }
+#ifndef TC_FLOAT
+        wrong |= !(fabs(add_up(&s) - inner[k]) <= 1e-9 * (1.0 + fabs(inner[k])));
+#endif
+"""
+
+#: the state of the monitoring shows what the outputs show only if a sensor fails
+_INNER = """
+#ifndef TC_FLOAT
+/* check value of the state of the monitoring */
+static const double inner[CALLS] = {{
+{values}
+}};
+
+static double part(double value, int k)
+{{
+    const double size = log(1.0 + 1e4 * fmin(fabs(value), 1e13));
+
+    return value < 0.0 ? -(k + 1) * size : (k + 1) * size;
+}}
+
+static double add_up(const {name}_state *s)
+{{
+    double sum = 0.0;
+    int k;
+
+{sums}
+    return s->looked ? sum : 0.0;
+}}
+#endif
 """
 
 
@@ -114,7 +145,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         1 um; `single` is 0 if single precision is not supported.
     """
     calls = range(len(readings.age))
-    told = np.column_stack([answers.status, answers.fault, answers.passed, answers.warm]).astype(int)
+    told = np.column_stack([answers.status, answers.fault, answers.why, answers.outside, answers.warm]).astype(int)
     return _PROGRAM.format(
         name=name,
         double=double,
@@ -129,7 +160,19 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         ),
         told=",\n".join(f"    {{{', '.join(map(str, row))}}}" for row in told.tolist()),
         faults=_FAULTS if tables.sensors else "",
+        inner=_inner(name, tables, answers) if tables.sensors else "",
     )
+
+
+def _inner(name: str, tables: Tables, answers: Answers) -> str:
+    sums = []
+    for variable in INNER:
+        size = math.prod(tables.sizes.get(d, 0) for d in Kept.variables()[variable].dims)
+        value = "s->cleared[k] ? 0.0 : s->evidence[k]" if variable == "evidence" else f"s->{variable}[k]"
+        if size:
+            sums.append(f"    for (k = 0; k < {size}; k++) {{\n        sum += part((double)({value}), k);\n    }}")
+    values = ",\n".join(f"    {v!r}" for v in answers.inner.tolist())
+    return _INNER.format(name=name, values=values, sums="\n".join(sums))
 
 
 def _rows(rows: Iterable[list[float]]) -> str:
