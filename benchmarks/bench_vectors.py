@@ -179,7 +179,8 @@ class InStructuredText:
         self.text = "".join(unit.text("codesys") for unit in self._units)
         readings = [make_readings(tables), *(draw_world(tables, seed) for seed in range(worlds))]
         answers = [replay(compensator, tables, r) for r in readings]
-        self._tests = [write_test(tables, NAME, "codesys", r, a) for r, a in zip(readings, answers, strict=True)]
+        pairs = zip(readings, answers, strict=True)
+        self._tests = [write_test(tables, NAME, "codesys", r, a, self._units) for r, a in pairs]
 
     def _passes(self, units: Sequence[SourceUnit], test: Sequence[SourceUnit]) -> bool:
         try:

@@ -1,11 +1,15 @@
 """A program that runs the C code of a compensator over its test vectors."""
 
 import math
+import re
+import textwrap
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from thermocomp.export.vectors import INNER, Answers, Readings
+from thermocomp.export.c99.c99 import Sources
+from thermocomp.export.vectors import INNER, Answers, Readings, add_up
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.variables import Kept
 
@@ -42,6 +46,12 @@ static const int told[CALLS][TARGETS + SENSORS + 3] = {{
 {told}
 }};
 {inner}
+#ifdef TC_FLOAT
+#define TABLES 1e-6
+#else
+#define TABLES 1e-12
+#endif
+
 static double worst;
 
 static int off(double value, double want)
@@ -93,12 +103,47 @@ int main(void)
                    k, (double)s.correction[0], wanted[k][0], s.status[0], told[k][0], s.rejected);
         }}
     }}
-    printf("%d calls, %d wrong; largest difference %.1e of max(1 um, correction), allowed %.0e\\n",
+{tables}    printf("%d calls, %d wrong; largest difference %.1e of max(1 um, correction), allowed %.0e\\n",
            CALLS, failed, worst, TOLERANCE);
     printf("state: %lu bytes\\n", (unsigned long)sizeof s);
     return failed != 0;
 }}
 """
+
+_TABLES = """    if (!(fabs({name}_tables() / {total!r} - 1.0) <= TABLES)) {{
+        printf("the tables of {name}.c are not those that were exported\\n");
+        failed++;
+    }}
+"""
+
+#: appended to the source, and its declaration
+_SUM = """
+/* add the numbers of a table to a check value: index from 1, times logarithm of the size */
+#define TC_ADD(type, table) \\
+    for (k = 0; k < (int)(sizeof(table) / sizeof(type)); k++) {{ \\
+        x = (double)((const type *)&(table))[k]; \\
+        size = log(1.0 + (1e4 * ((fabs(x) < 1e13) ? fabs(x) : 1e13))); \\
+        sum += (x < 0.0) ? (-(k + 1) * size) : ((k + 1) * size); \\
+    }}
+
+double {name}_tables(void)
+{{
+    double sum = 0.0;
+    double size;
+    double x;
+    int k;
+
+{adds}
+    return sum;
+}}
+"""
+_DECLARED = """/* Return a check value of all tables and limits. */
+double {name}_tables(void);
+
+#ifdef __cplusplus
+}}
+"""
+_TABLE = re.compile(r"^static const (tc_real|double|int) (\w+)(?:\[\d+\])* = ([^;]+);", re.MULTILINE)
 
 _FAULTS = """        for (j = 0; j < SENSORS; j++) {
             wrong |= s.fault[j] != told[k][TARGETS + j];
@@ -135,11 +180,41 @@ static double add_up(const {name}_state *s)
 """
 
 
-def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, double: float, single: float) -> str:
+def add_check(sources: Sources) -> tuple[Sources, float]:
+    """Return sources with a function that adds up all tables, and its expected result.
+
+    Most numbers of the monitoring decide only, and no reading shows a small change of them.
+    """
+    found = _TABLE.findall(sources.source)
+    adds = " ".join(f"TC_ADD({kind}, {name})" for kind, name, _ in found)
+    adds = textwrap.fill(adds, 116, initial_indent="    ", subsequent_indent="    ")
+    source = sources.source + _SUM.format(name=sources.name, adds=adds)
+    begin, end = sources.header.rsplit("#ifdef __cplusplus\n}\n", 1)
+    header = begin + _DECLARED.format(name=sources.name) + end
+    return replace(sources, header=header, source=source), add_up(map(_numbers, (text for *_, text in found)))
+
+
+def _numbers(text: str) -> list[float]:
+    """Return the numbers of a table."""
+    plain = re.sub(r"TC_ROUNDED\(\s*([^,]+),[^()]*\)", r"\1", text)
+    return [float(v) for v in re.sub(r"TC\(|[(){}\s]", "", plain).split(",")]
+
+
+def write_test(
+    name: str,
+    tables: Tables,
+    readings: Readings,
+    answers: Answers,
+    double: float,
+    single: float,
+    total: float | None = None,
+) -> str:
     """Return a program that compares the outputs of the code with those of the compensator.
 
     Parameters
     ----------
+    total : float, optional
+        Check value of the tables: see `add_check`.
     double, single : float
         Tolerance in double and in single precision, as a fraction of the correction, or in um for corrections below
         1 um; `single` is 0 if single precision is not supported.
@@ -161,6 +236,7 @@ def write_test(name: str, tables: Tables, readings: Readings, answers: Answers, 
         told=",\n".join(f"    {{{', '.join(map(str, row))}}}" for row in told.tolist()),
         faults=_FAULTS if tables.sensors else "",
         inner=_inner(name, tables, answers) if tables.sensors else "",
+        tables="" if total is None else _TABLES.format(name=name, total=total),
     )
 
 

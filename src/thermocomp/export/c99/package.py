@@ -10,7 +10,7 @@ import numpy as np
 from thermocomp.core.bounds import round_single
 from thermocomp.core.exceptions import SettingError
 from thermocomp.export.c99.c99 import translate
-from thermocomp.export.c99.ctest import write_test
+from thermocomp.export.c99.ctest import add_check, write_test
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
 from thermocomp.export.target import Target
@@ -98,13 +98,13 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
     single = _single(compensator, tables, readings, answers)
-    sources = translate(tables, name, said, double_only=not single)
+    sources, total = add_check(translate(tables, name, said, double_only=not single))
     name = sources.name
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
         f"{name}_test.c": write_test(
-            name, tables, readings, answers, _double(compensator, tables, readings, answers), single
+            name, tables, readings, answers, _double(compensator, tables, readings, answers), single, total
         ),
         f"{name}.md": _README.format(
             facts="  \n".join(said),

@@ -137,7 +137,7 @@ def write_blocks(
     readings = make_readings(tables)
     answers = replay(compensator, tables, readings)
     units = [*translate(tables, name, dialect), *more]
-    tests = write_test(tables, name, dialect, readings, answers)
+    tests = write_test(tables, name, dialect, readings, answers, units)
     head = "".join(f"(* {comment(line)} *)\n" for line in said)
     page = _README.format(
         facts="  \n".join(said),

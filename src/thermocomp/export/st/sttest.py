@@ -1,11 +1,12 @@
 """A function block that runs the structured text of a compensator over its test vectors, one call per cycle."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Sequence
 
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
-from thermocomp.export.st.ststatements import SCL, Dialect, array, number, quoted, safe, section, values, wrapped
-from thermocomp.export.vectors import INNER, Answers, Readings, find_tolerance
+from thermocomp.export.st.ststatements import SCL, TYPES, Dialect, array, number, quoted, safe, section, values, wrapped
+from thermocomp.export.vectors import INNER, Answers, Readings, add_up, find_tolerance
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Kind
 from thermocomp.runtime.program.variables import Kept
@@ -41,7 +42,7 @@ _BODY = """IF NOT {_}done THEN
     END_IF;
     {_}row := {_}row + 1;
     {_}done := {_}row >= {calls};
-END_IF;
+{tables}END_IF;
 """
 
 _NUMBERS = """    FOR {_}j := 0 TO {last_target} DO
@@ -74,6 +75,15 @@ _FAULTS = """    FOR {_}j := 0 TO {last_sensor} DO
     END_IF;
 """
 
+_TABLES = """    {_}want := {total};
+    IF {_}done AND NOT (ABS({check}(t := {_}t) / {_}want - 1.0) <= 1.0E-12) THEN
+        {_}wrong := {_}wrong + 1;
+    END_IF;
+"""
+
+#: a member of a structure with its initial value
+_VALUED = re.compile(r"^ {4}(\w+) : (?:ARRAY\[0\.\.(\d+)\] OF )?(\w+)\s*:=\s*([^;]*);", re.MULTILINE)
+
 _PART = """{_}size := ABS({_}value);
 IF {_}size > 1.0E+13 THEN
     {_}size := 1.0E+13;
@@ -86,8 +96,21 @@ END_IF;
 """
 
 
-def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, answers: Answers) -> list[SourceUnit]:
-    """Return the type with the test vectors, the functions of check values, and the block that runs the vectors."""
+def write_test(
+    tables: Tables,
+    name: str,
+    dialect: Dialect,
+    readings: Readings,
+    answers: Answers,
+    units: Sequence[SourceUnit] = (),
+) -> list[SourceUnit]:
+    """Return the type with the test vectors, the functions of check values, and the block that runs the vectors.
+
+    Parameters
+    ----------
+    units : sequence of SourceUnit
+        Of the compensator; the numbers of its structure of tables are compared, too.
+    """
     scl, inputs, calls = dialect == "scl", len(tables.channels), len(readings.age)
     targets, sensors = len(tables.targets), len(tables.sensors)
     mark = "#" if scl else ""
@@ -129,6 +152,7 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
                 "size": "LREAL",
                 "apart": "LREAL",
                 "off": "BOOL",
+                **({"t": quoted(f"{name}_tables", scl)} if units else {}),
             },
         ),
     ]
@@ -146,35 +170,63 @@ def write_test(tables: Tables, name: str, dialect: Dialect, readings: Readings, 
         "check": quoted(f"{name}_test_state", scl),
     }
     numbers = "".join(_NUMBERS.format(**sizes, output=o) for o in ("correction", "slope")[: 1 + sloped])
-    body = _BODY.format(**sizes, numbers=numbers, faults=_FAULTS.format(**sizes) if sensors else "")
-    checks = [*_checks(tables, name, scl)] if sensors else []
+    body = _BODY.format(**sizes, tables="{tables}", numbers=numbers, faults=_FAULTS.format(**sizes) if sensors else "")
+    checks = [_part(name, scl), _state(tables, name, scl)] if sensors or units else []
+    tables_ = next((u.declaration for u in units if u.name == f"{name}_tables"), "")
+    if tables_:
+        found = _VALUED.findall(tables_)
+        checks.append(_sum(name, "tables", [(m, kind, int(last or -1) + 1, "") for m, last, kind, _ in found], scl))
+        flags = {"TRUE": "1", "FALSE": "0"}
+        numbers = [[float(flags.get(v, v)) for v in re.split(r",\s*", text.strip("[]"))] for *_, text in found]
+        sizes["total"], sizes["check"] = number(add_up(numbers)), quoted(f"{name}_test_tables", scl)
+    body = body.replace("{tables}", _TABLES.format(**sizes) if tables_ else "")
     return [vectors, *checks, SourceUnit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
 
 
-def _checks(tables: Tables, name: str, scl: bool) -> Iterator[SourceUnit]:
-    """Yield the functions of the check value of the state: of a number, and of all."""
-    mark, local, head = "#" if scl else "", "VAR_TEMP" if scl else "VAR", "\n".join(SCL) + "\n" if scl else ""
-    part, state = quoted(f"{name}_test_part", scl), quoted(f"{name}_test_state", scl)
+def _part(name: str, scl: bool) -> SourceUnit:
+    """Return the function of a number's part in a check value."""
+    mark, own = "#" if scl else "", {"size": "LREAL"}
     given = section("VAR_INPUT", {"value": "LREAL", "index": "DINT"})
-    about = f"{head}(* Return the part of a number in a check value. *)\n"
-    text = f"FUNCTION {part} : LREAL\n{about}{given}\n{section(local, {'size': 'LREAL'})}"
-    yield SourceUnit(f"{name}_test_part", text, _PART.format(_=mark, name=name), "END_FUNCTION")
-    lines, total, at = [], f"{mark}total", f"{mark}s"
-    for variable in INNER:
+    text = _head(name, "part", "Return the part of a number in a check value.", given, own, scl)
+    return SourceUnit(f"{name}_test_part", text, _PART.format(_=mark, name=name), "END_FUNCTION")
+
+
+def _state(tables: Tables, name: str, scl: bool) -> SourceUnit:
+    """Return the function of the check value of the state of the monitoring."""
+    members = []
+    for variable in INNER if tables.sensors else ():
         var = Kept.variables()[variable]
-        value = f"{at}.{safe(variable)}[{mark}k]"
-        test = value if var.kind == "bool" else f"NOT {at}.cleared[{mark}k]" if variable == "evidence" else ""
-        number_ = "1.0" if var.kind == "bool" else value
-        own = [f"{total} := {total} + {part}(value := {number_}, index := {mark}k);"]
-        own = [f"IF {test} THEN", f"    {own[0]}", "END_IF;"] if test else own
-        if size := math.prod(tables.sizes.get(d, 0) for d in var.dims):
-            lines += [f"FOR {mark}k := 0 TO {size - 1} DO", *(f"    {line}" for line in own), "END_FOR;"]
-    lines = [f"{total} := 0.0;", f"IF {at}.looked THEN", *(f"    {line}" for line in lines), "END_IF;"]
-    given = section("VAR_IN_OUT", {"s": quoted(f"{name}_state", scl)})
-    about = f"{head}(* Return a check value of the state of the monitoring. *)\n"
-    text = f"FUNCTION {state} : LREAL\n{about}{given}\n{section(local, {'k': 'DINT', 'total': 'LREAL'})}"
-    body = "\n".join([*lines, f"{mark}{name}_test_state := {total};"])
-    yield SourceUnit(f"{name}_test_state", text, body, "END_FUNCTION")
+        size = math.prod(tables.sizes.get(d, 0) for d in var.dims)
+        unless = f"{'#' if scl else ''}s.cleared" if variable == "evidence" else ""
+        members += [(safe(variable), TYPES[var.kind], size, unless)] if size else []
+    return _sum(name, "state", members, scl)
+
+
+def _sum(name: str, word: str, members: Iterable[tuple[str, str, int, str]], scl: bool) -> SourceUnit:
+    """Return the function that adds up members of a structure: name, type, size (0: no array), flags that exclude."""
+    mark, bag = "#" if scl else "", word[0]
+    part, total, lines = quoted(f"{name}_test_part", scl), f"{mark}total", list[str]()
+    for member, kind, size, unless in members:
+        value = f"{mark}{bag}.{member}[{mark}k]" if size else f"{mark}{bag}.{member}"
+        given = {"BOOL": "1.0", "DINT": f"DINT_TO_LREAL({value})"}.get(kind, value)
+        own = [f"{total} := {total} + {part}(value := {given}, index := {f'{mark}k' if size else '0'});"]
+        if kind == "BOOL" or unless:
+            test = f"NOT {unless}[{mark}k]" if unless else value
+            own = [f"IF {test} THEN", f"    {own[0]}", "END_IF;"]
+        lines += [f"FOR {mark}k := 0 TO {size - 1} DO", *(f"    {line}" for line in own), "END_FOR;"] if size else own
+    lines = [f"{total} := 0.0;", *lines]
+    if word == "state":
+        lines += [f"IF NOT {mark}s.looked THEN", f"    {total} := 0.0;", "END_IF;"] if len(lines) > 1 else []
+    given = section("VAR_IN_OUT", {bag: quoted(f"{name}_{word}", scl)})
+    text = _head(name, word, f"Return the check value of {word}.", given, {"k": "DINT", "total": "LREAL"}, scl)
+    body = "\n".join([*lines, f"{mark}{name}_test_{word} := {total};"])
+    return SourceUnit(f"{name}_test_{word}", text, body, "END_FUNCTION")
+
+
+def _head(name: str, word: str, about: str, given: str, own: dict[str, str], scl: bool) -> str:
+    """Return the declaration of a function of the test."""
+    lines = [f"FUNCTION {quoted(f'{name}_test_{word}', scl)} : LREAL", *(SCL if scl else []), f"(* {about} *)", given]
+    return "\n".join([*lines, section("VAR_TEMP" if scl else "VAR", own)])
 
 
 def allow(tables: Tables) -> float:
