@@ -20,16 +20,17 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from code_mutants import Language, Mutant, draw
 
+from code_mutants import Language, Mutant, draw
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.export.c99 import package as c99
 from thermocomp.export.facts import Facts
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.sttest import write_test
-from thermocomp.export.vectors import DAMAGED, NOTHING, RETAINED, REZERO, TOLD_COLD, Readings, make_readings, replay
+from thermocomp.export.vectors import DAMAGED, NOTHING, RETAINED, REZERO, TOLD_COLD, Readings, replay
 from thermocomp.export.warming import Warming
 from thermocomp.files.machines import read_models
 from thermocomp.models.training import train
@@ -75,7 +76,10 @@ def draw_world(tables: Tables, seed: int) -> Readings:
         values += np.where(machine.heat, 0.003 * rng.standard_normal(n), 0.0)
         if rng.random() < 0.02:
             c = int(rng.integers(n))
-            bad[c] = draws.choice(("gone", "stuck", "shifted", "drift", "noise", "swap", "half")), float(rng.normal(0, 8))
+            bad[c] = (
+                draws.choice(("gone", "stuck", "shifted", "drift", "noise", "swap", "half")),
+                float(rng.normal(0, 8)),
+            )
         if rng.random() < 0.03:
             bad, offset = {}, np.zeros(n)
         for c, (how, size) in bad.items():
@@ -94,10 +98,14 @@ def draw_world(tables: Tables, seed: int) -> Readings:
                 values[other] = true[c]
         before = values
         age = 0.0 if rng.random() < 0.96 else draws.choice((5.0, 59.0, 61.0, -0.5, -2.0))
-        counter = 0.0 if rng.random() < 0.01 else counter + (rng.random() < 0.9) if counter or rng.random() < 0.01 else 0.0
+        counter = (
+            0.0 if rng.random() < 0.01 else counter + (rng.random() < 0.9) if counter or rng.random() < 0.01 else 0.0
+        )
         event, amount = (TOLD_COLD, 0.0) if k == 0 else (NOTHING, 0.0)
         if rng.random() < 0.02 and k:
-            event = draws.choice((RETAINED, RETAINED, DAMAGED, TOLD_COLD, REZERO + int(rng.integers(len(tables.targets)))))
+            event = draws.choice(
+                (RETAINED, RETAINED, DAMAGED, TOLD_COLD, REZERO + int(rng.integers(len(tables.targets))))
+            )
             amount = draws.choice((0.0, 60.0, 1800.0, 7200.0, 1e5)) if event < TOLD_COLD else float(rng.normal(0, 5))
         rows.append((np.round(values, 4), age, dt, counter))
         orders.append((event, amount))
@@ -170,7 +178,7 @@ class InStructuredText:
     """The exported package in structured text, and tests in other worlds."""
 
     def __init__(self, compensator: Compensator, tables: Tables, worlds: int) -> None:
-        import stmachine  # noqa: PLC0415 - needs blark
+        import stmachine
 
         for parsed in ("block_of", "declared"):
             setattr(stmachine, parsed, cache(getattr(stmachine, parsed)))

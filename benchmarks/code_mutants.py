@@ -73,7 +73,9 @@ def draw(text: str, language: Language, count: int, seed: int) -> list[Mutant]:
             of_part: dict[str, list[Mutant]] = {}
             for kind, begin, end, becomes in places(part[0], language, random_):
                 line = plain.count("\n", 0, part.start() + begin) + 1
-                of_part.setdefault(kind, []).append(Mutant(kind, line, part.start() + begin, part.start() + end, becomes))
+                of_part.setdefault(kind, []).append(
+                    Mutant(kind, line, part.start() + begin, part.start() + end, becomes)
+                )
             for kind, mutants in of_part.items():
                 found[kind].append(mutants)
     drawn: dict[Mutant, None] = {}

@@ -21,7 +21,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.polynomial import Polynomial
 from thermocomp.core.terms import Variable
 from thermocomp.export.c99.c99 import translate
-from thermocomp.export.vectors import Readings, make_readings, replay
+from thermocomp.export.scenarios import make_readings
+from thermocomp.export.vectors import Readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 

@@ -31,8 +31,9 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.export.c99 import package as cpackage
 from thermocomp.export.facts import Facts
 from thermocomp.export.onnx import package as onnxpackage
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st import package as stpackage
-from thermocomp.export.vectors import Readings, make_readings, round_all
+from thermocomp.export.vectors import Readings, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 

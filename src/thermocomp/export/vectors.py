@@ -17,7 +17,6 @@ from thermocomp.core.provenance import HonestError, Provenance
 from thermocomp.core.reading import Reading
 from thermocomp.core.validity import Validity
 from thermocomp.core.zero import Zeroing
-from thermocomp.export.warming import Warming
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import machine_seems_warm, power_up, rezero_measured, take_at_once
 from thermocomp.runtime.program.tables import Tables
@@ -80,7 +79,7 @@ def replay(
     state, clock, begun, rows = power_up(compensator, None, math.nan), 0.0, False, []
     warm, waiting, resumed, outside = False, dict[str, float](), set[str](), 0
     for *values, age, dt, counter, event, amount in readings.columns.tolist():
-        if REZERO <= event < REZERO + len(targets):
+        if REZERO <= event < REZERO + len(targets) and abs(amount) <= 1e30:
             waiting[targets[int(event) - REZERO]] = amount
         elif NOTHING < event < REZERO:
             state = _begin(compensator, state, int(event), amount)
@@ -167,7 +166,10 @@ def _check_inner(state: CompensatorState) -> float:
     if not state.watches or math.isnan(state.watches[0].time):
         return 0.0
     (s,) = state.watches
-    cleared, began = np.isneginf(s.evidence), [s.jumped, s.off, s.moving, s.back, s.heat.since, s.heat.doubt, s.heat.back]
+    cleared, began = (
+        np.isneginf(s.evidence),
+        [s.jumped, s.off, s.moving, s.back, s.heat.since, s.heat.doubt, s.heat.back],
+    )
     jumped, off, moving, back, wrong, doubtful, agree = (~np.isnan(a) for a in began)
     heat = (s.heat.heat, s.heat.stored, s.heat.estimate, s.heat.states)
     kept = (s.memory, s.traces, s.used, s.predicted, s.usual, s.step, jumped, off, moving, back, cleared)
@@ -223,124 +225,3 @@ def find_tolerance(models: Sequence[ErrorModel]) -> float:
     most = 10.0 * float(np.finfo(np.float64).eps) / min(slow, default=1.0)
     clocks = any(isinstance(n, Recurrence) for m in models for n in m.remembered)
     return max(most, 1e-11 if clocks else 1e-12)
-
-
-def make_readings(tables: Tables) -> Readings:
-    """Return readings that exercise all functions of a compensator.
-
-    A start at rest, with two impossible speeds, and a warm-up at changing speeds; each value missing, erratic or
-    impossible for a while; late, old or out-of-order readings; a source that stops until the corrections have faded to
-    zero, and its return; sensors that stick, step and drift one after the other; values beyond the trained range; a
-    source that repeats its values, and one whose counter does not advance. It is told cold at first; at the end it is
-    switched off and on with a retained state, without one, and with one that cannot be used.
-    """
-    machine = Warming(tables)
-    events: dict[int, tuple[int, float]] = {0: (TOLD_COLD, 0.0)}
-    age, hold, fade = (tables.values[n] for n in ("reading_age", "hold", "fade"))
-    rng = np.random.default_rng(0)
-    rows: list[tuple[FloatArray, float, float, float]] = []
-
-    def add(values: FloatArray, dt: float, old: float = 0.0, counter: float = 0.0) -> None:
-        noise = np.where(machine.heat, 0.002 * rng.standard_normal(len(values)), 0.0)
-        rows.append((np.round(values + noise, 4), old, dt, counter))
-
-    for k in range(45):
-        rest = machine.run(0.0, 10.0)
-        add(np.where(machine.heat | (k not in (5, 6)), rest, 1e9), 10.0, 0.5)
-    for k in range(120):
-        dt = 60.0 if k % 3 else 12.0
-        add(machine.run(_share(k), dt), dt, 0.25)
-    events[len(rows)] = RETAINED, 1800.0
-    _damage(machine, add, tables.models[0].thresholds.return_time)
-    _turn(machine, add, 30)
-    warm = machine.run(0.8, 10.0)
-    for old in (age + 1.0, -2.0, 30.0, 5.0, math.nan):
-        add(warm, 10.0, old)
-    for dt in (math.nan, -1.0, 0.0):
-        add(warm, dt)
-    # no readings: until just before and just after the end of the hold time, then until all corrections have faded
-    held = math.ceil(min(max(hold / age, 1.0), 200.0))
-    waits = [0.998 * hold / held] * held + [0.004 * hold] + [age] * math.ceil(min(3.0 * fade / age, 200.0))
-    for dt in waits:
-        rows.append((rows[-1][0], rows[-1][1] + dt + age, dt, 0.0))
-        machine.run(0.0, dt)
-    for share, dt in _THERE_AND_BACK:
-        add(machine.run(share, dt), dt)
-    _fail(tables, machine, add)
-    for k in range(24):
-        add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
-    add(machine.rest, 1e6)
-    _turn(machine, add, 20)
-    rows += [(rows[-1][0], 0.0, 20.0, 0.0)] * 20
-    _turn(machine, add, 5)
-    for k in range(12):
-        add(machine.run(0.8, age / 3), age / 3, counter=7.0 + (k > 0) + max(k - 8, 0))  # the first shows nothing
-    for event, amount, calls in _switched(tables):
-        events[len(rows)] = event, amount
-        for _ in range(calls):
-            add(machine.run(0.6, 15.0), 15.0)
-    values, ages, steps, counters = (np.array([r[k] for r in rows], dtype=np.float64) for k in range(4))
-    orders = np.array([events.get(k, (NOTHING, 0.0)) for k in range(len(rows))])
-    return Readings(
-        values=values, age=ages, dt=steps, counter=counters, event=orders[:, 0].astype(int), amount=orders[:, 1]
-    )
-
-
-def _switched(tables: Tables) -> list[tuple[int, float, int]]:
-    """Return events of a controller that is switched off and on, with the number of calls after each."""
-    day, cold = float(tables.values["resumable"]), float(tables.values["cold_after"])
-    short = min(1800.0, 0.9 * cold)
-    return [
-        (RETAINED, 1800.0, 8),
-        (RETAINED, 0.0, 8),  # for an unknown time
-        (REZERO, -7.0, 6),
-        (RETAINED, 60.0, 3),
-        (DAMAGED, short, 4),
-        (TOLD_COLD, 0.0, 6),
-        (RETAINED, max(day, cold) + 1.0, 6),
-        (DAMAGED, short, 2),
-        (DAMAGED, 1.01 * cold, 6),
-    ]
-
-
-#: (fraction of top speed, time step [s]) that moves corrections up and down at their rate limit
-_THERE_AND_BACK = [(1.0, 7.0)] * 8 + [(1.0, 600.0)] * 8 + [(0.0, 4 * 3600.0)] + [(0.0, 7.0)] * 8
-
-
-def _share(k: int) -> float:
-    """Return the fraction of top speed at a step of a test."""
-    return (0.0, 1.0, 0.4, 0.8)[k // 10 % 4]
-
-
-def _damage(machine: Warming, add: Callable[[FloatArray, float], None], back: float) -> None:
-    """Make each value wild for a while, until it is trusted again."""
-    for c in range(len(machine.rest)):
-        for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
-            values = machine.run(0.8, 15.0)
-            values[c] = wild
-            add(values, 15.0)
-        for _ in range(4):
-            add(machine.run(0.8, back / 3), back / 3)
-
-
-def _turn(machine: Warming, add: Callable[[FloatArray, float], None], minutes: int) -> None:
-    for k in range(minutes):
-        add(machine.run(_share(k), 60.0), 60.0)
-
-
-def _fail(tables: Tables, machine: Warming, add: Callable[[FloatArray, float], None]) -> None:
-    """Simulate sensor failures during warm-up: first of a sensor that may be lost, then of others."""
-    sensors = np.array(tables.values["sensor_channel"] if tables.sensors else np.flatnonzero(machine.heat))
-    if not len(sensors):
-        return
-    lost = np.all(tables.values["may_lose"], axis=0)[: len(sensors)]  # without the speeds
-    may = lost if tables.sensors else np.zeros(len(sensors), np.bool_)
-    moves = (machine.high - machine.low)[sensors]
-    stuck, stepped, drifting = (int(sensors[k]) for k in np.resize(np.lexsort((-moves, ~may)), 3))
-    before = machine.run(0.0, 60.0)[stuck]
-    for k in range(60):
-        values = machine.run(_share(k + 10), 60.0)
-        values[stuck] = before
-        values[stepped] += 6.0 * (k >= 25)
-        values[drifting] += 0.3 * max(k - 40, 0)
-        add(values, 60.0)

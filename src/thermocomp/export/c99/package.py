@@ -13,8 +13,9 @@ from thermocomp.export.c99.c99 import translate
 from thermocomp.export.c99.ctest import add_check, write_test
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.target import Target
-from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
+from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 

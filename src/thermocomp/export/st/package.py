@@ -8,13 +8,14 @@ from uuid import NAMESPACE_URL, uuid5
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
 from thermocomp.export.st.ststatements import BAGS, Dialect
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
-from thermocomp.export.vectors import make_readings, replay
+from thermocomp.export.vectors import replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 from thermocomp.runtime.program.variables import RECORDS
