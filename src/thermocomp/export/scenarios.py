@@ -295,7 +295,7 @@ def _repeat(story: _Story) -> None:
     story.run(3, 0.5)
     story.cold()
     story.run(4, 0.0)
-    for k in range(14):
+    for _ in range(14):
         values = story.rows[-1][0].copy()
         values[story.others] = story.machine.run(1.0, story.pace)[story.others]
         story.rows.append((values, 0.0, story.pace, 0.0))

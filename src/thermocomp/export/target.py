@@ -29,6 +29,8 @@ class Target:
         `write` accepts ``dialect``, one of these.
     magnitude : float
         Largest correction that the controller can represent [um].
+    vectors : bool
+        `write` accepts ``recording``, of which it makes test vectors, too.
     limited : bool
         The controller limits the correction to the magnitude of `Limits`.
     """
@@ -39,6 +41,7 @@ class Target:
     corrected: str = ""
     dialects: tuple[str, ...] = ()
     magnitude: float = RANGE
+    vectors: bool = False
     limited: bool = True
 
 

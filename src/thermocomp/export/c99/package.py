@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,25 +13,30 @@ from thermocomp.export.c99.c99 import translate
 from thermocomp.export.c99.ctest import add_check, write_test
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
-from thermocomp.export.scenarios import make_readings
+from thermocomp.export.recorded import find_readings
 from thermocomp.export.target import Target
 from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
+
+if TYPE_CHECKING:
+    from thermocomp.recordings.recording import Recording
 
 _README = """{facts}
 
 # {name}: thermal compensation in C99
 
 `{name}.h` and `{name}.c` need only `math.h`: no memory allocation, no global variables. `{name}_test.c` calls them
-{calls} times, with sensor faults among the inputs, and compares the results with those of thermocomp.
+{calls} times, with sensor faults among the inputs{recorded}, and compares the results with those of thermocomp; it also
+adds up all tables and limits.
 
 ## Verify it
 
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
 It prints the number of wrong calls (expected: 0), the largest difference, and the size of the state in bytes; its exit
-code is 0 if all results agree. {single}. Compile all files of your program in the same precision, otherwise they do not
+code is 0 if all results agree. With `-g -fsanitize=address,undefined -fno-sanitize-recover` (gcc, clang) it also ends
+at an index beyond an array, which would else show only if the result depends on it. {single}. Compile all files of your program in the same precision, otherwise they do not
 link. Never compile with `-ffast-math`.
 
 ## Run it
@@ -93,10 +98,12 @@ _DIGITS = 2.0
 _COARSE = 1.0
 
 
-def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
+def write_package(
+    compensator: Compensator, name: str, facts: Facts, recording: "Recording | None" = None
+) -> dict[str, bytes]:
     """Return all files of the export to C99, by name."""
     tables, said = gather(compensator), facts.lines(compensator)
-    readings = make_readings(tables)
+    readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
     single = _single(compensator, tables, readings, answers)
     sources, total = add_check(translate(tables, name, said, double_only=not single))
@@ -111,6 +118,7 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
             facts="  \n".join(said),
             name=name,
             calls=len(readings.age),
+            recorded=f", and readings of {recording.name}" if recording else "",
             single="For single precision add `-DTC_FLOAT`"
             if single
             else "Single precision (`-DTC_FLOAT`) is too coarse for this model, and does not compile",
@@ -162,4 +170,4 @@ def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.flo
     return values + way * _DIGITS * np.where(odd, last, -last)
 
 
-TARGET = Target(write=write_package)
+TARGET = Target(write=write_package, vectors=True)

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe
-from thermocomp.export.scenarios import make_readings
+from thermocomp.export.recorded import find_readings
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, comment, translate
@@ -19,6 +19,9 @@ from thermocomp.export.vectors import replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 from thermocomp.runtime.program.variables import RECORDS
+
+if TYPE_CHECKING:
+    from thermocomp.recordings.recording import Recording
 
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
@@ -57,8 +60,8 @@ yet.
 
 Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE. `wrong`
 must then be 0, and `largest`, the largest difference from thermocomp relative to the correction (in um for corrections
-below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults. Remove the test and its vectors
-afterwards.
+below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults{recorded}; at the end the test adds up
+all tables and limits. Remove the test and its vectors afterwards.
 
 ## Run it
 
@@ -120,9 +123,15 @@ _OBJECT = """<?xml version="1.0" encoding="utf-8"?>
 """
 
 
-def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
+def write_package(
+    compensator: Compensator,
+    name: str,
+    facts: Facts,
+    dialect: Dialect = "codesys",
+    recording: "Recording | None" = None,
+) -> dict[str, bytes]:
     """Return all files of the export to structured text, by name."""
-    return write_blocks(compensator, name, facts, dialect)
+    return write_blocks(compensator, name, facts, dialect, recording=recording)
 
 
 def write_blocks(
@@ -132,10 +141,11 @@ def write_blocks(
     dialect: Dialect,
     more: Sequence[SourceUnit] = (),
     about: str = "",
+    recording: "Recording | None" = None,
 ) -> dict[str, bytes]:
     """Return all files of a compensator, and of further blocks for a controller."""
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
-    readings = make_readings(tables)
+    readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
     units = [*translate(tables, name, dialect), *more]
     tests = write_test(tables, name, dialect, readings, answers, units)
@@ -149,6 +159,7 @@ def write_blocks(
         retain=_RETAIN[dialect].format(name=name),
         kilobytes=_kilobytes(tables, "s"),
         calls=len(readings.age),
+        recorded=f", and readings of {recording.name}" if recording else "",
         tolerance=allow(tables),
         **describe(compensator, tables),
     )
@@ -197,4 +208,4 @@ def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
     return f"{unit.name}.Tc{kind}", text
 
 
-TARGET = Target(write=write_package, dialects=get_args(Dialect))
+TARGET = Target(write=write_package, vectors=True, dialects=get_args(Dialect))
