@@ -150,7 +150,9 @@ class InC:
         objects = [f"{NAME}.o", f"{Path(test).stem}.o"]
         subprocess.run(["gcc", *objects, "-lm", "-o", "run"], cwd=self.folder, check=True)
         try:
-            return not subprocess.run(["./run"], cwd=self.folder, capture_output=True, timeout=PATIENCE, check=False).returncode
+            return not subprocess.run(
+                ["./run"], cwd=self.folder, capture_output=True, timeout=PATIENCE, check=False
+            ).returncode
         except subprocess.TimeoutExpired:
             return False
 

@@ -39,7 +39,9 @@ def _of_recording(tables: Tables, recording: "Recording") -> Readings:
     source = recording.source or recording.name
     if missing := [c.name for c in tables.channels if not recording.has(c.name)]:
         has = ", ".join(c.name for c in recording.channels)
-        raise InputError(f"--vectors-from {source}: no column {', '.join(missing)}, an input of the models; it has {has}")
+        raise InputError(
+            f"--vectors-from {source}: no column {', '.join(missing)}, an input of the models; it has {has}"
+        )
     channels = [recording.channel(c.name) for c in tables.channels]
     for own, channel in zip(tables.channels, channels, strict=True):
         if own.unit != channel.unit:

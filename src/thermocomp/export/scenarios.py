@@ -162,6 +162,8 @@ _STARTS: list[tuple[Callable[[int], float], dict[int, float]]] = [
     (lambda i: 9.0 if i < 3 else 1.0, {}),
     (lambda i: -9.0 if i < 2 else 0.1 * (i * 5 % 7), {}),
     (lambda i: -2.0 if i % 2 else 2.0, {}),
+    (lambda i: 0.3 * (i * 5 % 7), {0: -40.0, 1: 150.0, 2: math.nan}),
+    (lambda i: 0.3 * (i * 5 % 7), {0: -40.0, 3: 90.0}),
 ]
 
 
@@ -176,6 +178,12 @@ def _start_strangely(story: _Story, start: tuple[Callable[[int], float], dict[in
             values[story.others] = (math.nan, 1e6)[k - 1]
 
     story.cold(7, spoil)
+    for row in story.rows[-7:-4]:  # without noise
+        for i, value in wild.items():
+            row[0][story.sensors[i : i + 1]] = value
+    if story.tables.sizes["has_speed"] and not wild:  # it just stands, and turns slowly
+        for k, row in enumerate(story.rows[-7:]):
+            row[0][story.tables.values["speed_channel"]] = story.tables.values["stopped_speed"] * (1.0 + 0.5 * (k > 4))
     story.run(2, 1.0, lambda _, values: spoil(9, values))
 
 
@@ -265,19 +273,22 @@ def _mislead(story: _Story, share: float) -> None:
     story.run(2, 1.0, lambda _, values: values.__setitem__(story.others, math.nan))
     story.run(3, 1.0)
     story.run(20 if share else 52, 1.0, dt=600.0)
-    story.run(2, (1.3, 2.5))
+    story.run(3, (1.3, 2.5, float(story.tables.values["least_share"])))
 
 
 def _drift(story: _Story) -> None:
     """Let one sensor drift and another be noisy; they return."""
     story.cold()
     story.run(8, 1.0)
+    story.run(1, 1.1)
 
     def drift(k: int, values: FloatArray) -> None:
         values[story.sensors[2 % len(story.sensors)]] += 0.2 * k
         values[story.sensors[-1]] += 3.0 * (k % 2)
+        if k > 12:
+            values[story.sensors[3 % len(story.sensors)]] = math.nan
 
-    story.run(24, (1.0, 0.5), drift)
+    story.run(26, (1.0, 0.5), drift, dt=200.0)
     story.run(16, 0.9, dt=300.0)
 
 
@@ -289,9 +300,12 @@ def _repeat(story: _Story) -> None:
         story.run(1, _share(k), dt=slow)
         if k % 5 == 0:  # a single temperature changes
             story.rows.append((story.rows[-1][0].copy(), 0.0, slow, 0.0))
-            story.rows[-1][0][story.sensors[:1]] += 0.05
+            story.rows[-1][0][story.heat[:1] if k % 2 else story.heat[-1:]] += 0.05
         story.rows.append((story.rows[-1][0], 0.0, slow, 0.0))
-    story.rows += [(story.rows[-1][0], 0.0, slow, 0.0)] * 36
+    for k in range(36):
+        story.rows.append((story.rows[-1][0].copy(), 0.0, slow, 0.0))
+        if story.tables.sensors:  # in two ways not a number: that is no change
+            story.rows[-1][0][story.sensors[-1]] = math.nan if k < 18 else math.inf
     story.run(3, 0.5)
     story.cold()
     story.run(4, 0.0)
@@ -309,27 +323,30 @@ def _switch(story: _Story) -> None:
     """Switch the controller off and on; re-zero targets."""
     day, cold = float(story.tables.values["resumable"]), float(story.tables.values["cold_after"])
     short, last = min(1800.0, 0.9 * cold), REZERO + len(story.tables.targets) - 1
-    for event, amount, calls in (
-        (RETAINED, 1800.0, 4),
-        (RETAINED, story.hold + 1.0, 3),
-        (RETAINED, story.hold, 3),
-        (RETAINED, 0.0, 3),  # for an unknown time
-        (REZERO, -7.0, 6),
-        (last, 4.0, 1),
-        (REZERO, math.inf, 1),
-        (last + 1, 5.0, 2),
-        (RETAINED, 60.0, 3),
-        (DAMAGED, short, 2),
-        (last, 3.0, 6),
-        (TOLD_COLD, 0.0, 6),
-        (RETAINED, day, 3),
-        (RETAINED, max(day, cold) + 1.0, 6),
-        (RETAINED, story.hold + 30.0, 0),
+    for event, amount, calls, shares in (
+        (RETAINED, 1800.0, 4, 0.6),
+        (RETAINED, story.hold + 1.0, 3, 0.6),
+        (RETAINED, story.hold, 3, 0.6),
+        (RETAINED, 0.0, 3, 0.6),  # for an unknown time
+        (REZERO, -7.0, 6, 0.6),
+        (last, 4.0, 1, 0.6),
+        (REZERO, math.inf, 1, 0.6),
+        (last + 1, 5.0, 2, 0.6),
+        (RETAINED, 60.0, 3, 0.6),
+        (DAMAGED, short, 2, 0.0),
+        (last, 3.0, 8, 0.0),
+        (TOLD_COLD, 0.0, 6, (0.3, 0.9, 0.5)),
+        (RETAINED, day, 3, 0.6),
+        (RETAINED, max(day, cold) + 1.0, 6, 0.6),
+        (RETAINED, story.hold + 30.0, 0, 0.6),
     ):
         story.order(event, amount)
-        story.run(calls, 0.6)
+        story.run(calls, shares)
     for _ in range(3):  # nothing usable for too long after a power-up: the axes may be in use
         story.add(story.machine.run(0.6, story.pace), 0.6 * story.age, 2.0 * story.age)
+    story.run(2, 0.2)
+    story.order(RETAINED, story.hold + 30.0)
+    story.add(story.machine.run(0.6, story.age), story.age, 2.0 * story.age)
     story.run(2, 0.2)
     for amount, calls in ((short, 2), (cold, 2), (1.01 * cold, 6), (math.inf, 2)):
         story.order(DAMAGED, amount)

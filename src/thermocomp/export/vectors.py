@@ -178,11 +178,9 @@ def _check_inner(state: CompensatorState) -> float:
 
 def add_up(numbers: Iterable[Any]) -> float:
     """Return a check value of lists of numbers: the sum of the index from 1, times the logarithm of the size."""
-    total = 0.0
-    for values in numbers:
-        x = np.ravel(np.asarray(values, dtype=np.float64))
-        total += float(np.sum(np.arange(1.0, len(x) + 1.0) * np.sign(x) * np.log1p(1e4 * np.minimum(np.abs(x), 1e13))))
-    return total
+    lists = [np.ravel(np.asarray(values, dtype=np.float64)) for values in numbers]
+    x, index = (np.concatenate(a) if a else np.zeros(0) for a in (lists, [np.arange(1.0, len(v) + 1.0) for v in lists]))
+    return float(np.sum(index * np.sign(x) * np.log1p(1e4 * np.minimum(np.abs(x), 1e13))))
 
 
 def _begin(compensator: Compensator, state: CompensatorState, event: int, amount: float) -> CompensatorState:

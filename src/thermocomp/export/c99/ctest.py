@@ -17,6 +17,7 @@ _PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 #include "{name}.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 
 #ifdef TC_FLOAT
@@ -66,10 +67,14 @@ static int off(double value, double want)
 static void happen({name}_state *s, int event, double amount)
 {{
     static {name}_saved saved;
+    static size_t damaged;
 
     if (event == 1 || event == 2) {{
         {name}_save(s, &saved);
-        saved.state.correction[0] += event == 2;
+        if (event == 2) {{ /* at the first byte, at the last one, between them, ... */
+            ((unsigned char *)&saved.state)[damaged * (sizeof saved.state - 1) / 2] ^= 1;
+            damaged = (damaged + 2) % 3;
+        }}
         {name}_power_up(s, &saved, amount);
     }} else if (event == 3) {{
         {name}_cold(s);
