@@ -41,6 +41,7 @@ from thermocomp.runtime.program.tables import Tables, gather
 from thermocomp.virtual.datasets import record
 
 MUTANTS, SEED, WORLDS, CALLS, ALLOWED = 100, 1, 12, 1200, 0.05
+LANGUAGES = ("c", "st")
 PATIENCE = 60.0
 HONEST = HonestError("made up", 1.0, 1.0, 2.0, 5.0, 5.0, {}, "accepted", "so that it runs", rules=RULES)
 FACTS = Facts("model.json", "0" * 64, "0", "2026-01-01", {})
@@ -102,7 +103,7 @@ def draw_world(tables: Tables, seed: int) -> Readings:
             0.0 if rng.random() < 0.01 else counter + (rng.random() < 0.9) if counter or rng.random() < 0.01 else 0.0
         )
         event, amount = (TOLD_COLD, 0.0) if k == 0 else (NOTHING, 0.0)
-        if rng.random() < 0.02 and k:
+        if rng.random() < 0.02 and k and rows[-1][2] >= 10.0:  # a block retains its state every ten seconds
             event = draws.choice(
                 (RETAINED, RETAINED, DAMAGED, TOLD_COLD, REZERO + int(rng.integers(len(tables.targets))))
             )
@@ -253,17 +254,18 @@ def main() -> int:
     parser.add_argument("--model", type=Path, help="model file; default: models of the demo")
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--mutants", type=int, default=MUTANTS)
-    parser.add_argument("--language", choices=["c", "st"])
+    parser.add_argument("--language", choices=LANGUAGES)
     parser.add_argument("--worlds", type=int, default=WORLDS)
     given = parser.parse_args()
     models = read_models(given.model) if given.model else demo_models()
     compensator = Compensator.of(models, Limits(), watching=True)
     tables, good = gather(compensator), True
-    if given.language != "st" and shutil.which("gcc"):
+    languages = [given.language] if given.language else LANGUAGES
+    if "c" in languages and shutil.which("gcc"):
         with tempfile.TemporaryDirectory() as folder:
             c = InC(compensator, tables, given.worlds, Path(folder))
             good &= measure("c", c.text, c.judge, given.mutants, given.seed)
-    if given.language != "c":
+    if "st" in languages:
         try:
             st = InStructuredText(compensator, tables, min(given.worlds, 2))
         except ModuleNotFoundError as error:

@@ -121,21 +121,28 @@ def _line_places(line: str, language: Language, random_: random.Random) -> Itera
         return
     if re.match(r"(static|void|int|double|tc_real|const|unsigned)\b|\s+(int|tc_real|double|static|const)\b", line):
         return
-    for table, kind in ((_COMPARE[language], "compare"), (_SIGNS, "sign"), (_WORDS[language], "condition")):
-        for m in re.finditer(r"(?<=\s)(?:[<>=!]=?|<>|[-+*/]|&&|\|\||AND|OR|TRUE)(?=\s|;)", line):
-            for other in table.get(m[0], ()):
-                if not (m[0] == "=" and language == "c"):
-                    yield kind, *m.span(), other
-    if test := _TEST[language].search(line):
-        no = "!" if language == "c" else "NOT "
-        yield "condition", *test.span(1), f"{no}({test[1]})"
-    for m in _NOT[language].finditer(line):
-        yield "condition", *m.span(), ""
-    if (m2 := _CHOICE.search(line)) and language == "c":
-        yield "condition", m2.start("one"), m2.end("other"), f"{m2['other']} : {m2['one']}"
+    yield from _operators(line, language)
+    yield from _conditions(line, language)
     for m in re.finditer(r"\[([a-z]\w*)\]", line):
         yield "index", *m.span(1), random_.choice(("0", f"{m[1]} - {m[1]}"))
     for m in _NUMBER.finditer(line):
         yield "number", *m.span(), _other_number(m[0], random_)
     if _ASSIGN[language].match(line):
         yield "assignment", len(line) - len(line.lstrip()), len(line), ";"
+
+
+def _operators(line: str, language: Language) -> Iterator[Place]:
+    for table, kind in ((_COMPARE[language], "compare"), (_SIGNS, "sign"), (_WORDS[language], "condition")):
+        for m in re.finditer(r"(?<=\s)(?:[<>=!]=?|<>|[-+*/]|&&|\|\||AND|OR|TRUE)(?=\s|;)", line):
+            for other in table.get(m[0], ()):
+                yield kind, *m.span(), other
+
+
+def _conditions(line: str, language: Language) -> Iterator[Place]:
+    if test := _TEST[language].search(line):
+        no = "!" if language == "c" else "NOT "
+        yield "condition", *test.span(1), f"{no}({test[1]})"
+    for m in _NOT[language].finditer(line):
+        yield "condition", *m.span(), ""
+    if language == "c" and (choice := _CHOICE.search(line)):
+        yield "condition", choice.start("one"), choice.end("other"), f"{choice['other']} : {choice['one']}"

@@ -118,7 +118,7 @@ def _warm_up(story: _Story) -> None:
         dt = 60.0 if k % 3 else 12.0
         story.add(machine.run(_share(k), dt), dt, 0.25)
     story.order(RETAINED, 1800.0)
-    for c in range(len(machine.rest)):
+    for c in np.array_split(np.arange(len(machine.rest)), min(len(machine.rest), 30)):
         for wild in (math.nan, math.inf, -127.0, 85.0, 1e9):
             values = machine.run(0.8, 15.0)
             values[c] = wild
@@ -138,8 +138,10 @@ def _disturb(story: _Story) -> None:
     for old, dt in ((-1.0, 10.0), (age, age + 40.0), (0.5, 10.0), (age, 2.0), (0.0, 10.0)):
         story.add(machine.run(0.8, dt), dt, old)
     # no readings: until just before and just after the end of the hold time, then while corrections fade
-    held = math.ceil(min(max(story.hold / age, 1.0), 200.0))
-    waits = [0.998 * story.hold / held] * held + [0.004 * story.hold] + [age] * math.ceil(min(story.fade / age, 30.0))
+    held = math.ceil(min(max(story.hold / age, 1.0), 100.0))
+    waits = (
+        [0.998 * story.hold / held] * held + [0.004 * story.hold] + [age] * math.ceil(min(3.0 * story.fade / age, 30.0))
+    )
     for dt in waits:
         story.rows.append((story.rows[-1][0], story.rows[-1][1] + dt + age, dt, 0.0))
         machine.run(0.0, dt)

@@ -36,8 +36,8 @@ adds up all tables and limits.
 
 It prints the number of wrong calls (expected: 0), the largest difference, and the size of the state in bytes; its exit
 code is 0 if all results agree. With `-g -fsanitize=address,undefined -fno-sanitize-recover` (gcc, clang) it also ends
-at an index beyond an array, which would else show only if the result depends on it. {single}. Compile all files of your program in the same precision, otherwise they do not
-link. Never compile with `-ffast-math`.
+at an index beyond an array. {single}. Compile all files of your program in the
+same precision, otherwise they do not link. Never compile with `-ffast-math`.
 
 ## Run it
 

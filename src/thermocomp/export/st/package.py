@@ -60,8 +60,8 @@ yet.
 
 Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE. `wrong`
 must then be 0, and `largest`, the largest difference from thermocomp relative to the correction (in um for corrections
-below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults{recorded}; at the end the test adds up
-all tables and limits. Remove the test and its vectors afterwards.
+below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults{recorded}. At the end the test adds
+up all tables and limits. Remove the test and its vectors afterwards.
 
 ## Run it
 
