@@ -54,7 +54,7 @@ class _Story:
         self.tables, self.rows = tables, list[tuple[FloatArray, float, float, float]]()
         self.events: dict[int, tuple[int, float]] = {}
         self.age, self.hold, self.fade = (float(tables.values[n]) for n in ("reading_age", "hold", "fade"))
-        self.pace = min(60.0, self.age)
+        self.pace = min(60.0, max(self.age, 10.0))  # a block retains its state every ten seconds
         self._rng = np.random.default_rng(0)
         self.machine = Warming(tables)
         self.heat = np.flatnonzero(self.machine.heat)
@@ -219,41 +219,30 @@ def _jump(story: _Story) -> None:
 
 
 def _stick(story: _Story) -> None:
-    """Let sensors stick: from the start, in a warm-up, and at rest."""
-    story.cold(6, lambda _, values: values.__setitem__(story.sensors[1], 21.5))
-    held = story.machine.run(0.0, 1.0)
-
-    def stick(k: int, values: FloatArray) -> None:
-        values[story.sensors[1]] = 21.5
-        if k == 12:
-            held[:] = values
-        if k > 12:
-            values[story.sensors[0]] = held[story.sensors[0]]
-
-    before = len(story.rows)
-    story.run(36, (0.3, 1.0, 1.0), stick)
-    for row in range(before - 6, len(story.rows)):  # without noise
-        story.rows[row][0][story.sensors[1]] = 21.5
-        if row > before + 12:
-            story.rows[row][0][story.sensors[0]] = held[story.sensors[0]]
+    """Let sensors stick: from the start and in a warm-up, and at rest."""
+    one, other, third = (story.sensors[k % len(story.sensors)] for k in range(3))
+    begin = len(story.rows)
     story.cold()
-    before = len(story.rows)
+    story.run(36, (0.3, 1.0, 1.0))
+    story.cold()
     story.run(26, 0.0)
-    for row in range(before + 2, len(story.rows)):
-        story.rows[row][0][story.sensors[2]] = story.rows[before + 1][0][story.sensors[2]]
+    rows = [row[0] for row in story.rows[begin:]]  # without noise
+    for k in range(42):
+        rows[k][other] = 21.5
+        rows[k][one] = rows[min(k, 18)][one]
+    for row in rows[50:]:
+        row[third] = rows[49][third]
 
 
 def _coarsen(story: _Story) -> None:
     """Show temperatures as rounded by a coarse converter; one sticks."""
     for digit in (0.5, 2.0):
-        before = len(story.rows)
         story.cold()
         story.run(22, (0.3, 1.0))
-        for k in range(before, len(story.rows)):
-            values = story.rows[k][0]
+        rows = [row[0] for row in story.rows[-28:]]
+        for k, values in enumerate(rows):
             values[story.sensors] = np.round(values[story.sensors] / digit) * digit
-            if k > before + 14:
-                values[story.sensors[0]] = story.rows[before + 14][0][story.sensors[0]]
+            values[story.sensors[0]] = rows[min(k, 14)][story.sensors[0]]
 
 
 def _swap(story: _Story, first: int, second: int) -> None:
@@ -325,6 +314,7 @@ def _switch(story: _Story) -> None:
     """Switch the controller off and on; re-zero targets."""
     day, cold = float(story.tables.values["resumable"]), float(story.tables.values["cold_after"])
     short, last = min(1800.0, 0.9 * cold), REZERO + len(story.tables.targets) - 1
+    story.run(1, 0.6)
     for event, amount, calls, shares in (
         (RETAINED, 1800.0, 4, 0.6),
         (RETAINED, story.hold + 1.0, 3, 0.6),
