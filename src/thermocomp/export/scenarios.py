@@ -133,7 +133,7 @@ def _disturb(story: _Story) -> None:
     warm = machine.run(0.8, 10.0)
     for old in (age + 1.0, age, -2.0, 30.0, 5.0, math.nan):
         story.add(warm, 10.0, old)
-    for dt in (math.nan, -1.0, 0.0, 1e10, 2e10, 10.0):
+    for dt in (math.nan, -1.0, 0.0, 2e10, 10.0):
         story.add(warm, dt)
     for old, dt in ((-1.0, 10.0), (age, age + 40.0), (0.5, 10.0), (age, 2.0), (0.0, 10.0)):
         story.add(machine.run(0.8, dt), dt, old)
