@@ -26,6 +26,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.export.c99 import package as c99
+from thermocomp.export.c99.ctest import write_test as write_program
 from thermocomp.export.facts import Facts
 from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st.structuredtext import SourceUnit, translate
@@ -61,7 +62,7 @@ def draw_world(tables: Tables, seed: int) -> Readings:
     """Draw readings of a machine with random speeds, faults, clocks, counters and power-ups."""
     rng, draws = np.random.default_rng(seed), random.Random(seed)
     machine, n = Warming(tables), len(tables.channels)
-    rows, orders = [], []
+    rows, orders = list[tuple[np.ndarray, float, float, float]](), list[tuple[int, float]]()
     offset, bad = np.zeros(n), dict[int, tuple[str, float]]()
     counter, share = 0.0, 0.0
     pace = draws.choice((5.0, 10.0, 20.0, 60.0))
@@ -135,7 +136,7 @@ class InC:
             readings = draw_world(tables, seed)
             answers = replay(compensator, tables, readings)
             self.tests.append(f"world{seed}.c")
-            (folder / self.tests[-1]).write_text(c99.write_test(NAME, tables, readings, answers, 1e-9, 0.0))
+            (folder / self.tests[-1]).write_text(write_program(NAME, tables, readings, answers, 1e-9, 0.0))
         for test in self.tests:
             subprocess.run(["gcc", "-std=c99", "-c", test], cwd=folder, check=True)
         self._original = self._compile(self.text)

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -189,17 +191,21 @@ def _start_strangely(story: _Story, start: tuple[Callable[[int], float], dict[in
     story.run(2, 1.0, lambda _, values: spoil(9, values))
 
 
+def _hide(channels: Any, _: int, values: FloatArray) -> None:
+    values[channels] = math.nan
+
+
 def _lose(story: _Story) -> None:
     """Lose several sensors at once, at last all and the speeds."""
     story.cold()
     story.run(10, (1.0, 0.5))
     groups = [story.sensors[:k] for k in (2, 3, 4, 5)] + [story.sensors[-k:] for k in (2, 4)]
     for lost in groups:
-        story.run(2, 0.7, lambda _, values, lost=lost: values.__setitem__(lost, math.nan))
+        story.run(2, 0.7, partial(_hide, lost))
         story.run(4, 0.7, dt=250.0)
-    story.run(3, 0.7, lambda _, values: values.__setitem__(story.sensors, math.nan))
+    story.run(3, 0.7, partial(_hide, story.sensors))
     story.run(2, 0.7, lambda _, values: values.fill(math.nan))
-    story.run(2, 0.7, lambda _, values: values.__setitem__(story.others, math.nan))
+    story.run(2, 0.7, partial(_hide, story.others))
     story.run(5, 0.7)
 
 
@@ -261,7 +267,7 @@ def _mislead(story: _Story, share: float) -> None:
     story.cold()
     story.run(10, 1.0)
     story.run(26, 1.0, lambda _, values: values.__setitem__(story.others, share * values[story.others]))
-    story.run(2, 1.0, lambda _, values: values.__setitem__(story.others, math.nan))
+    story.run(2, 1.0, partial(_hide, story.others))
     story.run(3, 1.0)
     story.run(20 if share else 52, 1.0, dt=600.0)
     story.run(3, (1.3, 2.5, float(story.tables.values["least_share"])))

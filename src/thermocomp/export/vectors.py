@@ -20,6 +20,7 @@ from thermocomp.core.zero import Zeroing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import machine_seems_warm, power_up, rezero_measured, take_at_once
 from thermocomp.runtime.program.tables import Tables
+from thermocomp.runtime.program.variables import Kept
 from thermocomp.runtime.state import NO_ZERO, CompensatorState
 from thermocomp.runtime.watch import WORDS
 
@@ -159,6 +160,13 @@ INNER = (
     *("memory", "traces", "used", "predicted", "usual", "step", "has_jumped", "is_off", "is_moving", "is_back"),
     *("cleared", "evidence", "heat", "stored", "estimate", "estimated", "is_wrong", "is_doubtful", "does_agree"),
 )
+
+
+def find_inner(tables: Tables) -> dict[str, int]:
+    """Return the variables of `INNER` that a compensator has, and their sizes."""
+    sizes = {n: math.prod(tables.sizes.get(d, 0) for d in Kept.variables()[n].dims) for n in INNER}
+    unused = () if tables.sizes["supervised"] else ("estimated", "does_agree")
+    return {n: size for n, size in sizes.items() if size and n not in unused}
 
 
 def _check_inner(state: CompensatorState) -> float:

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from thermocomp.export.c99.c99 import Sources
-from thermocomp.export.vectors import INNER, Answers, Readings, add_up
+from thermocomp.export.vectors import Answers, Readings, add_up, find_inner
 from thermocomp.runtime.program.tables import Tables
-from thermocomp.runtime.program.variables import Kept
 
 _PROGRAM = """/* runs {name}.c on its test vectors; instructions: {name}.md */
 #include "{name}.h"
@@ -247,11 +246,9 @@ def write_test(
 
 def _inner(name: str, tables: Tables, answers: Answers) -> str:
     sums = []
-    for variable in INNER:
-        size = math.prod(tables.sizes.get(d, 0) for d in Kept.variables()[variable].dims)
+    for variable, size in find_inner(tables).items():
         value = "s->cleared[k] ? 0.0 : s->evidence[k]" if variable == "evidence" else f"s->{variable}[k]"
-        if size:
-            sums.append(f"    for (k = 0; k < {size}; k++) {{\n        sum += part((double)({value}), k);\n    }}")
+        sums.append(f"    for (k = 0; k < {size}; k++) {{\n        sum += part((double)({value}), k);\n    }}")
     values = ",\n".join(f"    {v!r}" for v in answers.inner.tolist())
     return _INNER.format(name=name, values=values, sums="\n".join(sums))
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from thermocomp.export.st.structuredtext import NOTHING, SourceUnit
 from thermocomp.export.st.ststatements import SCL, TYPES, Dialect, array, number, quoted, safe, section, values, wrapped
-from thermocomp.export.vectors import INNER, Answers, Readings, add_up, find_tolerance
+from thermocomp.export.vectors import Answers, Readings, add_up, find_inner, find_tolerance
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.tree import Kind
 from thermocomp.runtime.program.variables import Kept
@@ -177,8 +177,8 @@ def write_test(
         found = _VALUED.findall(tables_)
         checks.append(_sum(name, "tables", [(m, kind, int(last or -1) + 1, "") for m, last, kind, _ in found], scl))
         flags = {"TRUE": "1", "FALSE": "0"}
-        numbers = [[float(flags.get(v, v)) for v in re.split(r",\s*", text.strip("[]"))] for *_, text in found]
-        sizes["total"], sizes["check"] = number(add_up(numbers)), quoted(f"{name}_test_tables", scl)
+        lists = [[float(flags.get(v, v)) for v in re.split(r",\s*", text.strip("[]"))] for *_, text in found]
+        sizes["total"], sizes["check"] = number(add_up(lists)), quoted(f"{name}_test_tables", scl)
     body = body.replace("{tables}", _TABLES.format(**sizes) if tables_ else "")
     return [vectors, *checks, SourceUnit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
 
@@ -194,11 +194,9 @@ def _part(name: str, scl: bool) -> SourceUnit:
 def _state(tables: Tables, name: str, scl: bool) -> SourceUnit:
     """Return the function of the check value of the state of the monitoring."""
     members = []
-    for variable in INNER if tables.sensors else ():
-        var = Kept.variables()[variable]
-        size = math.prod(tables.sizes.get(d, 0) for d in var.dims)
+    for variable, size in find_inner(tables).items() if tables.sensors else ():
         unless = f"{'#' if scl else ''}s.cleared" if variable == "evidence" else ""
-        members += [(safe(variable), TYPES[var.kind], size, unless)] if size else []
+        members.append((safe(variable), TYPES[Kept.variables()[variable].kind], size, unless))
     return _sum(name, "state", members, scl)
 
 
