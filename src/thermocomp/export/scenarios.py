@@ -151,7 +151,7 @@ def _disturb(story: _Story) -> None:
         story.add(machine.run(share, dt), dt)
     for k in range(24):
         story.add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
-    story.add(machine.rest, 1e6)
+    story.add(machine.rest, 2e5)
     _turn(story, 5)
 
 

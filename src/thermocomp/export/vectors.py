@@ -52,6 +52,18 @@ class Readings(NamedTuple):
         event = np.where(np.arange(len(none)) == 0, TOLD_COLD, NOTHING) if self.event is None else self.event
         return np.column_stack([self.values, self.age, self.dt, counter, event, amount])
 
+    def shifted(self, way: int, kind: type[np.floating[Any]] = np.float64) -> "Readings":
+        """Return readings shifted by their last digits in a precision: odd up, even down, equal readings alike.
+
+        By two units, the largest error of the difference of two readings. Whole numbers stay: they may be at a limit.
+        """
+        values = self.values
+        with np.errstate(invalid="ignore"):
+            moves = np.isfinite(values) & (values != np.rint(values))
+            last = np.where(moves, np.spacing(values.astype(kind)).astype(np.float64), 0.0)
+            odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
+        return self._replace(values=values + way * 2.0 * np.where(odd, last, -last))
+
 
 class Answers(NamedTuple):
     """Outputs of a compensator for the readings of the test vectors."""
@@ -66,6 +78,13 @@ class Answers(NamedTuple):
     why: IntArray = np.zeros(0, dtype=int)  #: (n_calls,), why the reading was not used: the block's ``rejected``
     outside: IntArray = np.zeros(0, dtype=int)  #: (n_calls,), number of inputs beyond the trained range
     inner: FloatArray = np.zeros(0)  #: (n_calls,), check value of the state of the monitoring, see `INNER`
+
+    def certain(self, shifted: Iterable["Answers"]) -> "Answers":
+        """Return these answers without the check values that the last digit of a reading changes: nan."""
+        inner, limit = self.inner.copy(), 1e-9 * (1.0 + np.abs(self.inner))
+        for other in shifted:
+            inner[np.abs(other.inner - self.inner) > limit] = np.nan
+        return self._replace(inner=inner)
 
 
 def replay(

@@ -95,7 +95,10 @@ int main(void)
         }}
         happen(&s, (int)given[k][INPUTS + 3], given[k][INPUTS + 4]);
         {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
-        wrong = s.rejected != told[k][TARGETS + SENSORS] || s.outside != told[k][TARGETS + SENSORS + 1];
+        wrong = s.rejected != told[k][TARGETS + SENSORS];
+#ifndef TC_FLOAT
+        wrong |= s.outside != told[k][TARGETS + SENSORS + 1];
+#endif
         wrong |= s.warm != told[k][TARGETS + SENSORS + 2];
         for (j = 0; j < TARGETS; j++) {{
             wrong |= off((double)s.correction[j], wanted[k][2 * j]);
@@ -153,14 +156,14 @@ _FAULTS = """        for (j = 0; j < SENSORS; j++) {
             wrong |= s.fault[j] != told[k][TARGETS + j];
         }
 #ifndef TC_FLOAT
-        wrong |= !(fabs(add_up(&s) - inner[k]) <= 1e-9 * (1.0 + fabs(inner[k])));
+        wrong |= inner[k] == inner[k] && !(fabs(add_up(&s) - inner[k]) <= 1e-9 * (1.0 + fabs(inner[k])));
 #endif
 """
 
 #: the state of the monitoring shows what the outputs show only if a sensor fails
 _INNER = """
 #ifndef TC_FLOAT
-/* check value of the state of the monitoring */
+/* check value of the state of the monitoring; NAN: rounding decides */
 static const double inner[CALLS] = {{
 {values}
 }};
@@ -249,7 +252,7 @@ def _inner(name: str, tables: Tables, answers: Answers) -> str:
     for variable, size in find_inner(tables).items():
         value = "s->cleared[k] ? 0.0 : s->evidence[k]" if variable == "evidence" else f"s->{variable}[k]"
         sums.append(f"    for (k = 0; k < {size}; k++) {{\n        sum += part((double)({value}), k);\n    }}")
-    values = ",\n".join(f"    {v!r}" for v in answers.inner.tolist())
+    values = ",\n".join(f"    {_number(v)}" for v in answers.inner.tolist())
     return _INNER.format(name=name, values=values, sums="\n".join(sums))
 
 

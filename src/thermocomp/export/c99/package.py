@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -92,8 +92,6 @@ compensation at the same time.
 """
 
 
-#: largest error of the difference of two readings, in units of the last digit
-_DIGITS = 2.0
 #: largest error of single precision as a fraction of the correction; above it, single precision is rejected
 _COARSE = 1.0
 
@@ -105,15 +103,16 @@ def write_package(
     tables, said = gather(compensator), facts.lines(compensator)
     readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
+    shifted = [replay(compensator, tables, readings.shifted(way)) for way in (1, -1)]
+    # large coefficients amplify the last digit of a reading
+    double = max(find_tolerance(tables.models), *(4.0 * _apart(answers, other) for other in shifted))
     single = _single(compensator, tables, readings, answers)
     sources, total = add_check(translate(tables, name, said, double_only=not single))
     name = sources.name
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(
-            name, tables, readings, answers, _double(compensator, tables, readings, answers), single, total
-        ),
+        f"{name}_test.c": write_test(name, tables, readings, answers.certain(shifted), double, single, total),
         f"{name}.md": _README.format(
             facts="  \n".join(said),
             name=name,
@@ -128,12 +127,6 @@ def write_package(
     return {file: text.encode() for file, text in texts.items()}
 
 
-def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return the tolerance for double precision: large coefficients amplify the last digit of a reading."""
-    rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
-    return max(find_tolerance(tables.models), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
-
-
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
     """Return the tolerance for single precision: ten times the effect of rounding all numbers; 0 if too large.
 
@@ -146,7 +139,7 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
         return 0.0
 
     def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> float:
-        rows = readings._replace(values=_shifted(round_single(readings.values), way, np.float32))
+        rows = readings._replace(values=round_single(readings.values)).shifted(way, np.float32)
         said = replay(coarse, tables, rows, rounded=rounded)
         if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
             return math.inf
@@ -160,14 +153,6 @@ def _apart(one: Answers, other: Answers) -> float:
     """Return the largest difference of corrections, as a fraction of the correction, or in um below 1 um."""
     pairs = (one.correction, other.correction), (one.slope, other.slope)
     return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
-
-
-def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.float64) -> FloatArray:
-    """Return readings shifted by their last digits in a precision: odd up, even down, equal readings alike."""
-    with np.errstate(invalid="ignore"):
-        last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
-        odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
-    return values + way * _DIGITS * np.where(odd, last, -last)
 
 
 TARGET = Target(write=write_package, vectors=True)

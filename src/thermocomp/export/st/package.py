@@ -147,6 +147,7 @@ def write_blocks(
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
     readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
+    answers = answers.certain(replay(compensator, tables, readings.shifted(way)) for way in (1, -1))
     units = [*translate(tables, name, dialect), *more]
     tests = write_test(tables, name, dialect, readings, answers, units)
     head = "".join(f"(* {comment(line)} *)\n" for line in said)
