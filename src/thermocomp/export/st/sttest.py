@@ -114,25 +114,7 @@ def write_test(
     scl, inputs, calls = dialect == "scl", len(tables.channels), len(readings.age)
     targets, sensors = len(tables.targets), len(tables.sensors)
     mark = "#" if scl else ""
-    held: dict[str, tuple[Kind, Sequence[float]]] = {
-        "given": ("real", _finite(readings.columns.ravel())),
-        "correction": ("real", answers.correction.ravel().tolist()),
-        "told": ("int", answers.status.ravel().tolist()),
-        "why": ("int", answers.why.tolist()),
-        "outside": ("int", answers.outside.tolist()),
-        "warm": ("bool", answers.warm.tolist()),
-    }
-    if sloped := any(tables.values["to_slope"]):
-        held["slope"] = ("real", answers.slope.ravel().tolist())
-    if sensors:
-        held |= {"found": ("int", answers.fault.ravel().tolist()), "inner": ("real", _finite(answers.inner))}
-    lines = [
-        f"TYPE {quoted(f'{name}_vectors', scl)}{'' if scl else ' :'}",
-        *(SCL if scl else []),
-        "STRUCT",
-    ]
-    lines += [wrapped(f"    {n} : {array(k, len(v))} := {values(v, k)};") for n, (k, v) in held.items()]
-    vectors = SourceUnit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
+    vectors = _vectors(tables, name, readings, answers, scl)
     parts = [
         f"FUNCTION_BLOCK {quoted(f'{name}_test', scl)}",
         *(SCL if scl else []),
@@ -169,7 +151,9 @@ def write_test(
         "last_sensor": sensors - 1,
         "check": quoted(f"{name}_test_state", scl),
     }
-    numbers = "".join(_NUMBERS.format(**sizes, output=o) for o in ("correction", "slope")[: 1 + sloped])
+    numbers = "".join(
+        _NUMBERS.format(**sizes, output=o) for o in ("correction", "slope")[: 1 + any(tables.values["to_slope"])]
+    )
     body = _BODY.format(**sizes, tables="{tables}", numbers=numbers, faults=_FAULTS.format(**sizes) if sensors else "")
     checks = [_part(name, scl), _state(tables, name, scl)] if sensors or units else []
     tables_ = next((u.declaration for u in units if u.name == f"{name}_tables"), "")
@@ -181,6 +165,29 @@ def write_test(
         sizes["total"], sizes["check"] = number(add_up(lists)), quoted(f"{name}_test_tables", scl)
     body = body.replace("{tables}", _TABLES.format(**sizes) if tables_ else "")
     return [vectors, *checks, SourceUnit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
+
+
+def _vectors(tables: Tables, name: str, readings: Readings, answers: Answers, scl: bool) -> SourceUnit:
+    """Return the type that holds the test vectors."""
+    held: dict[str, tuple[Kind, Sequence[float]]] = {
+        "given": ("real", _finite(readings.columns.ravel())),
+        "correction": ("real", answers.correction.ravel().tolist()),
+        "told": ("int", answers.status.ravel().tolist()),
+        "why": ("int", answers.why.tolist()),
+        "outside": ("int", answers.outside.tolist()),
+        "warm": ("bool", answers.warm.tolist()),
+    }
+    if any(tables.values["to_slope"]):
+        held["slope"] = ("real", answers.slope.ravel().tolist())
+    if tables.sensors:
+        held |= {"found": ("int", answers.fault.ravel().tolist()), "inner": ("real", _finite(answers.inner))}
+    lines = [
+        f"TYPE {quoted(f'{name}_vectors', scl)}{'' if scl else ' :'}",
+        *(SCL if scl else []),
+        "STRUCT",
+    ]
+    lines += [wrapped(f"    {n} : {array(k, len(v))} := {values(v, k)};") for n, (k, v) in held.items()]
+    return SourceUnit(f"{name}_vectors", "\n".join([*lines, f"END_STRUCT{';' if scl else ''}", "END_TYPE"]))
 
 
 def _part(name: str, scl: bool) -> SourceUnit:
