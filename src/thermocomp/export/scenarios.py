@@ -133,11 +133,12 @@ def _disturb(story: _Story) -> None:
     machine, age = story.machine, story.age
     _turn(story, 30)
     warm = machine.run(0.8, 10.0)
-    for old in (age + 1.0, age, -2.0, 30.0, 5.0, math.nan):
+    edge = age if age == round(age) else 0.5 * age
+    for old in (age + 1.0, edge, -2.0, 30.0, 5.0, math.nan):
         story.add(warm, 10.0, old)
     for dt in (math.nan, -1.0, 0.0, 2e10, 10.0):
         story.add(warm, dt)
-    for old, dt in ((-1.0, 10.0), (age, age + 40.0), (0.5, 10.0), (age, 2.0), (0.0, 10.0)):
+    for old, dt in ((-1.0, 10.0), (edge, age + 40.0), (0.5, 10.0), (edge, 2.0), (0.0, 10.0)):
         story.add(machine.run(0.8, dt), dt, old)
     # no readings: until just before and just after the end of the hold time, then while corrections fade
     held = math.ceil(min(max(story.hold / age, 1.0), 100.0))
@@ -147,11 +148,11 @@ def _disturb(story: _Story) -> None:
     for dt in waits:
         story.rows.append((story.rows[-1][0], story.rows[-1][1] + dt + age, dt, 0.0))
         machine.run(0.0, dt)
+    story.add(machine.rest, 1e6)
     for share, dt in _THERE_AND_BACK:
         story.add(machine.run(share, dt), dt)
     for k in range(24):
         story.add(machine.run(0.5, 20.0) + 1.3 * (machine.high - machine.low) * math.sin(k / 4), 20.0)
-    story.add(machine.rest, 2e5)
     _turn(story, 5)
 
 
