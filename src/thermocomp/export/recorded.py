@@ -1,7 +1,7 @@
 """Test vectors from a recording: its readings at its times, beside those of the scenarios."""
 
 import math
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -10,14 +10,11 @@ from thermocomp.export.scenarios import make_readings
 from thermocomp.export.vectors import NOTHING, TOLD_COLD, Readings
 from thermocomp.runtime.program.tables import Tables
 
-if TYPE_CHECKING:
-    from thermocomp.recordings.recording import Recording
-
 #: a controller has to hold the vectors: of a longer recording every second, third, ... reading is taken
 MOST = 1500
 
 
-def find_readings(tables: Tables, recording: "Recording | None") -> Readings:
+def find_readings(tables: Tables, recording: Any) -> Readings:
     """Return the readings of the scenarios, then those of a recording if there is one.
 
     Raises
@@ -34,7 +31,7 @@ def find_readings(tables: Tables, recording: "Recording | None") -> Readings:
     return Readings(values=values, age=age, dt=dt, counter=counter, event=event.astype(int), amount=amount)
 
 
-def _of_recording(tables: Tables, recording: "Recording") -> Readings:
+def _of_recording(tables: Tables, recording: Any) -> Readings:
     """Return the readings of a recording; each of its cycles starts cold."""
     source = recording.source or recording.name
     if missing := [c.name for c in tables.channels if not recording.has(c.name)]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from thermocomp.export.target import Target
 from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
-
-if TYPE_CHECKING:
-    from thermocomp.recordings.recording import Recording
 
 _README = """{facts}
 
@@ -96,9 +93,7 @@ compensation at the same time.
 _COARSE = 1.0
 
 
-def write_package(
-    compensator: Compensator, name: str, facts: Facts, recording: "Recording | None" = None
-) -> dict[str, bytes]:
+def write_package(compensator: Compensator, name: str, facts: Facts, recording: Any = None) -> dict[str, bytes]:
     """Return all files of the export to C99, by name."""
     tables, said = gather(compensator), facts.lines(compensator)
     readings = find_readings(tables, recording)

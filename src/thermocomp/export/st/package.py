@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, get_args
+from typing import Any, get_args
 from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.c99.c99 import identifier
@@ -19,9 +19,6 @@ from thermocomp.export.vectors import replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 from thermocomp.runtime.program.variables import RECORDS
-
-if TYPE_CHECKING:
-    from thermocomp.recordings.recording import Recording
 
 _INSTALL: dict[Dialect, str] = {
     "codesys": """`{name}.st` holds types, functions and the function block `{name}`, in IEC 61131-3 structured text.
@@ -128,7 +125,7 @@ def write_package(
     name: str,
     facts: Facts,
     dialect: Dialect = "codesys",
-    recording: "Recording | None" = None,
+    recording: Any = None,
 ) -> dict[str, bytes]:
     """Return all files of the export to structured text, by name."""
     return write_blocks(compensator, name, facts, dialect, recording=recording)
@@ -141,7 +138,7 @@ def write_blocks(
     dialect: Dialect,
     more: Sequence[SourceUnit] = (),
     about: str = "",
-    recording: "Recording | None" = None,
+    recording: Any = None,
 ) -> dict[str, bytes]:
     """Return all files of a compensator, and of further blocks for a controller."""
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
