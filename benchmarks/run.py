@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 #: run only if named: they take hours, or do not measure speed
-BY_HAND = ("verdict", "recommended", "stable", "bands", "plan", "watch", "linuxcnc", "warm_start")
+BY_HAND = ("verdict", "recommended", "stable", "bands", "plan", "watch", "linuxcnc", "warm_start", "vectors")
 
 
 def main() -> int:

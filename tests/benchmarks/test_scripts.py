@@ -27,6 +27,7 @@ SMALLEST: dict[str, dict[str, Any]] = {
         "JOBS": 3,
     },
     "stepwise": {"N_ROWS": 300, "N_TEMPERATURES": 4},
+    "vectors": {"MUTANTS": 8, "WORLDS": 1, "CALLS": 60, "LANGUAGES": ("c",)},
     "warm_start": {"RESTARTS": 6, "COLD_STARTS": 1},
     "volumetric": {"POINTS": 300, "EXACT_POINTS": 200},
 }

@@ -18,7 +18,8 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.position import PositionModel
 from thermocomp.export.facts import Facts
 from thermocomp.export.linuxcnc.package import write_package
-from thermocomp.export.vectors import Readings, make_readings, replay
+from thermocomp.export.scenarios import make_readings
+from thermocomp.export.vectors import Readings, replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 

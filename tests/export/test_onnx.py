@@ -38,7 +38,7 @@ from thermocomp.export.onnx import nodes
 from thermocomp.export.onnx.graph import translate
 from thermocomp.export.onnx.package import NOT_INSIDE, write_package
 from thermocomp.export.onnx.vectors import answer, make_readings
-from thermocomp.export.vectors import make_readings as make_faults
+from thermocomp.export.scenarios import make_readings as make_faults
 from thermocomp.export.vectors import replay
 from thermocomp.files import modelfile, positionfile
 from thermocomp.runtime.compensator import Compensator

@@ -10,13 +10,14 @@ from watchedmachine import watched_model
 
 from thermocomp.core.correction import Limits
 from thermocomp.export.facts import Facts
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st.package import write_package
 from thermocomp.export.st.plcopen import NAMESPACE, write_project
 from thermocomp.export.st.rules import find_violations
 from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.sttest import write_test
-from thermocomp.export.vectors import make_readings, replay
+from thermocomp.export.vectors import replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
 

@@ -22,11 +22,12 @@ from watchedmachine import watched_model
 from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.export.facts import Facts
+from thermocomp.export.scenarios import make_readings
 from thermocomp.export.st.package import write_package
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.ststatements import RESERVED
 from thermocomp.export.st.sttest import write_test
-from thermocomp.export.vectors import NOTHING, TOLD_COLD, Readings, make_readings, replay
+from thermocomp.export.vectors import NOTHING, TOLD_COLD, Readings, replay
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather

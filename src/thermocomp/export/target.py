@@ -31,6 +31,8 @@ class Target:
         Largest correction that the controller can represent [um].
     program : bool
         `write` accepts ``program``, a program number.
+    vectors : bool
+        `write` accepts ``recording``, of which it makes test vectors, too.
     limited : bool
         The controller limits the correction to the magnitude of `Limits`.
     """
@@ -42,6 +44,7 @@ class Target:
     dialects: tuple[str, ...] = ()
     magnitude: float = RANGE
     program: bool = False
+    vectors: bool = False
     limited: bool = True
 
 

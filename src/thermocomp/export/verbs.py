@@ -96,6 +96,7 @@ def export(
     limits: Limits = Limits(),
     starts: "Starts" = None,
     mapping: "str | Path | Columns | None" = None,
+    vectors_from: "str | Path | Recording | None" = None,
     accept_unproven: str | None = None,
     date: str | None = None,
     progress: Callable[..., None] = silent,
@@ -135,6 +136,9 @@ def export(
         As for `compare`.
     mapping : str, Path or Mapping, optional
         TOML mapping file: role and unit of each column of the recordings.
+    vectors_from : Recording, str or Path, optional
+        Recording of which test vectors are made, too, for c99 and st: up to 1,500 of its readings at its times, and
+        the compensator's response.
     accept_unproven : str, optional
         Person who approves the use of an unproven model, and the reason: "NAME, REASON".
     date : str, optional
@@ -190,7 +194,7 @@ def export(
         options=options,
     )
     if target.shape is None:
-        found = _export_whole(order, left, dialect)
+        found = _export_whole(order, left, dialect, _recording(to, target, vectors_from, mapping))
     else:
         found = export_reduced(order, _constant(left, to), tests, starts, accept_unproven, listener)
     return ExportedCode(found.files, refused | found.refused, elsewhere | found.elsewhere)
@@ -217,6 +221,19 @@ def _read(
     return tests
 
 
+def _recording(
+    to: str, target: Target, given: "str | Path | Recording | None", mapping: "str | Path | Columns | None"
+) -> "Recording | None":
+    """Return the recording of which test vectors are made."""
+    if given is None:
+        return None
+    if not target.vectors:
+        raise InputError(f"--vectors-from: {to} does not support it; --to c99 and --to st do")
+    from thermocomp.api.inputs import recordings_of
+
+    return recordings_of(given, mapping)[0]
+
+
 def _facts(model: Path, date: str | None, left_out: Mapping[str, str]) -> Facts:
     return Facts(
         source=model.name,
@@ -227,10 +244,13 @@ def _facts(model: Path, date: str | None, left_out: Mapping[str, str]) -> Facts:
     )
 
 
-def _export_whole(order: ExportOrder, models: Models, dialect: Dialect | None) -> Outcome:
+def _export_whole(
+    order: ExportOrder, models: Models, dialect: Dialect | None, recording: "Recording | None"
+) -> Outcome:
     """Create the files for a target that supports the full model."""
     target, options, elsewhere = order.target, order.options, dict[str, str]()
     writer = _writer(target, models, dialect, options.named())
+    writer = partial(writer, recording=recording) if recording is not None else writer
     if target.corrected:
         models, axes, elsewhere = along_axes(models, options, order.to, target.corrected)
         writer = partial(target.write, axes=axes)

@@ -10,11 +10,12 @@ import numpy as np
 from thermocomp.core.bounds import round_single
 from thermocomp.core.exceptions import SettingError
 from thermocomp.export.c99.c99 import identifier, translate
-from thermocomp.export.c99.ctest import write_test
+from thermocomp.export.c99.ctest import add_check, write_test
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe, explain
+from thermocomp.export.recorded import find_readings
 from thermocomp.export.target import Target
-from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, make_readings, replay, round_all
+from thermocomp.export.vectors import Answers, FloatArray, Readings, find_tolerance, replay, round_all
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 
@@ -23,15 +24,17 @@ _README = """{facts}
 # {name}: thermal compensation in C99
 
 `{name}.h` and `{name}.c` need only `math.h`: no memory allocation, no global variables. `{name}_test.c` calls them
-{calls} times, with sensor faults among the inputs, and compares the results with those of thermocomp.
+{calls} times, with sensor faults among the inputs{recorded}, and compares the results with those of thermocomp; it also
+adds up all tables and limits.
 
 ## Verify it
 
     cc -std=c99 {name}.c {name}_test.c -lm -o {name}_test && ./{name}_test
 
 It prints the number of wrong calls (expected: 0), the largest difference, and the size of the state in bytes; its exit
-code is 0 if all results agree. {single}. Compile all files of your program in the same precision, otherwise they do not
-link. Never compile with `-ffast-math`.
+code is 0 if all results agree. With `-g -fsanitize=address,undefined -fno-sanitize-recover` (gcc, clang) it also ends
+at an index beyond an array. {single}. Compile all files of your program in the
+same precision, otherwise they do not link. Never compile with `-ffast-math`.
 
 ## Run it
 
@@ -92,19 +95,20 @@ compensation at the same time.
 """
 
 
-#: largest error of the difference of two readings, in units of the last digit
-_DIGITS = 2.0
 #: loss of single precision [um] above which it is stated, and above which single precision is rejected
 _STATED, _COARSE = 0.05, 0.5
 #: largest tolerance of a test in single precision, as a fraction of the correction
 _TOLERANCE = 1.0
 
 
-def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str, bytes]:
+def write_package(compensator: Compensator, name: str, facts: Facts, recording: Any = None) -> dict[str, bytes]:
     """Return all files of the export to C99, by name."""
     tables, said = gather(compensator), facts.lines(compensator)
-    readings = make_readings(tables)
+    readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
+    shifted = [replay(compensator, tables, readings.shifted(way)) for way in (1, -1)]
+    # large coefficients amplify the last digit of a reading
+    double = max(find_tolerance(tables.models), *(4.0 * _apart(answers, other) for other in shifted))
     single, loss = _single(compensator, tables, readings, answers)
     if loss > _STATED or not single:
         said.append(
@@ -120,18 +124,17 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         cold=f"{own}_cold",
         off=f"{own}_step with an age of 1e9",
     )
-    sources = translate(tables, name, said, told, double_only=not single)
+    sources, total = add_check(translate(tables, name, said, told, double_only=not single))
     name = sources.name
     texts = {
         f"{name}.h": sources.header,
         f"{name}.c": sources.source,
-        f"{name}_test.c": write_test(
-            name, tables, readings, answers, _double(compensator, tables, readings, answers), single
-        ),
+        f"{name}_test.c": write_test(name, tables, readings, answers.certain(shifted), double, single, total),
         f"{name}.md": _README.format(
             facts="  \n".join(said),
             name=name,
             calls=len(readings.age),
+            recorded=f", and readings of {recording.name}" if recording else "",
             single="For single precision add `-DTC_FLOAT`"
             if single
             else "Single precision (`-DTC_FLOAT`) is too coarse for this model, and does not compile",
@@ -139,12 +142,6 @@ def write_package(compensator: Compensator, name: str, facts: Facts) -> dict[str
         ),
     }
     return {file: text.encode() for file, text in texts.items()}
-
-
-def _double(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> float:
-    """Return the tolerance for double precision: large coefficients amplify the last digit of a reading."""
-    rows = [readings._replace(values=_shifted(readings.values, way)) for way in (1, -1)]
-    return max(find_tolerance(tables.models), *(4.0 * _apart(answers, replay(compensator, tables, r)) for r in rows))
 
 
 def _single(compensator: Compensator, tables: Tables, readings: Readings, answers: Answers) -> tuple[float, float]:
@@ -160,7 +157,7 @@ def _single(compensator: Compensator, tables: Tables, readings: Readings, answer
         return 0.0, math.inf
 
     def moved(way: int, rounded: Callable[[FloatArray], FloatArray] | None = None) -> tuple[float, float]:
-        rows = readings._replace(values=_shifted(round_single(readings.values), way, np.float32))
+        rows = readings._replace(values=round_single(readings.values)).shifted(way, np.float32)
         said = replay(coarse, tables, rows, rounded=rounded)
         if any((a != b).any() for a, b in ((answers.status, said.status), (answers.fault, said.fault))):
             return math.inf, math.inf
@@ -186,12 +183,4 @@ def _apart(one: Answers, other: Answers) -> float:
     return max(float((np.abs(a - b) / np.maximum(1.0, np.abs(a))).max(initial=0.0)) for a, b in pairs)
 
 
-def _shifted(values: FloatArray, way: int, kind: type[np.floating[Any]] = np.float64) -> FloatArray:
-    """Return readings shifted by their last digits in a precision: odd up, even down, equal readings alike."""
-    with np.errstate(invalid="ignore"):
-        last = np.where(np.isfinite(values), np.spacing(values.astype(kind)).astype(np.float64), 0.0)
-        odd = np.where(last != 0.0, values / np.where(last == 0.0, 1.0, last), 0.0) % 2.0 >= 1.0
-    return values + way * _DIGITS * np.where(odd, last, -last)
-
-
-TARGET = Target(write=write_package)
+TARGET = Target(write=write_package, vectors=True)

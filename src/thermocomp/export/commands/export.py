@@ -62,6 +62,7 @@ def no_file(output: Path, _: Mapping[str, Any]) -> list[Path]:
     forms={
         "model": Path,
         "recordings": list[Path] | None,
+        "vectors_from": Path | None,
         "limits": CorrectionOptions,
         "settings": ReductionOptions,
     },

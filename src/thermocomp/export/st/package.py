@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import get_args
+from typing import Any, get_args
 from uuid import NAMESPACE_URL, uuid5
 
 from thermocomp.export.c99.c99 import identifier
 from thermocomp.export.facts import Facts
 from thermocomp.export.pages import describe, explain
+from thermocomp.export.recorded import find_readings
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
 from thermocomp.export.st.structuredtext import SourceUnit, translate
 from thermocomp.export.st.ststatements import BAGS, Dialect, comment, wrapped
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
-from thermocomp.export.vectors import make_readings, replay
+from thermocomp.export.vectors import replay
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import Tables, gather
 from thermocomp.runtime.program.variables import RECORDS
@@ -56,8 +57,8 @@ yet.
 
 Call an instance of `{name}_test` in a task, once per cycle. After {calls} cycles its output `done` is TRUE. `wrong`
 must then be 0, and `largest`, the largest difference from thermocomp relative to the correction (in um for corrections
-below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults. Remove the test and its vectors
-afterwards.
+below 1 um), must be below {tolerance:.1g}. The test vectors include sensor faults{recorded}. At the end the test adds
+up all tables and limits. Remove the test and its vectors afterwards.
 
 ## Run it
 
@@ -119,9 +120,15 @@ _OBJECT = """<?xml version="1.0" encoding="utf-8"?>
 """
 
 
-def write_package(compensator: Compensator, name: str, facts: Facts, dialect: Dialect = "codesys") -> dict[str, bytes]:
+def write_package(
+    compensator: Compensator,
+    name: str,
+    facts: Facts,
+    dialect: Dialect = "codesys",
+    recording: Any = None,
+) -> dict[str, bytes]:
     """Return all files of the export to structured text, by name."""
-    return write_blocks(compensator, name, facts, dialect)
+    return write_blocks(compensator, name, facts, dialect, recording=recording)
 
 
 def write_blocks(
@@ -131,13 +138,15 @@ def write_blocks(
     dialect: Dialect,
     more: Sequence[SourceUnit] = (),
     about: str = "",
+    recording: Any = None,
 ) -> dict[str, bytes]:
     """Return all files of a compensator, and of further blocks for a controller."""
     tables, said, name = gather(compensator), facts.lines(compensator), identifier(name)
-    readings = make_readings(tables)
+    readings = find_readings(tables, recording)
     answers = replay(compensator, tables, readings)
+    answers = answers.certain(replay(compensator, tables, readings.shifted(way)) for way in (1, -1))
     units = [*translate(tables, name, dialect), *more]
-    tests = write_test(tables, name, dialect, readings, answers)
+    tests = write_test(tables, name, dialect, readings, answers, units)
     more_said = explain(
         compensator,
         tables,
@@ -155,6 +164,7 @@ def write_blocks(
         retain=_RETAIN[dialect].format(name=name),
         kilobytes=_kilobytes(tables, "s"),
         calls=len(readings.age),
+        recorded=f", and readings of {recording.name}" if recording else "",
         tolerance=allow(tables),
         **describe(compensator, tables),
     )
@@ -205,4 +215,4 @@ def _object(unit: SourceUnit, head: str) -> tuple[str, str]:
     return f"{unit.name}.Tc{kind}", text
 
 
-TARGET = Target(write=write_package, dialects=get_args(Dialect))
+TARGET = Target(write=write_package, vectors=True, dialects=get_args(Dialect))
