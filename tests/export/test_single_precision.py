@@ -207,7 +207,7 @@ def test_points_of_a_curve_that_single_precision_does_not_tell_apart(tmp_path: P
 
 
 @needs_compiler
-@pytest.mark.parametrize("factor", [100.0, 1500.0, 1e4])
+@pytest.mark.parametrize("factor", [100.0, 1500.0, 2e4])
 def test_large_coefficients_make_more_of_the_last_digit(
     tmp_path: Path, factor: float, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -229,8 +229,8 @@ def test_large_coefficients_make_more_of_the_last_digit(
     assert ("\nSingle precision (-DTC_FLOAT) " in capsys.readouterr().out) == (factor > 100.0)
     single, page = prove(tmp_path, texts, "-DTC_FLOAT"), texts["tc_x.md"].decode()
     stated = {name: "\nSingle precision (-DTC_FLOAT) " + words in page for name, words in WORDS.items()}
-    if factor == 1e4:
-        assert "single precision is too coarse" in single  # by up to 0.61 um
+    if factor == 2e4:
+        assert "single precision is too coarse" in single  # by up to 0.92 um
         assert stated == {"refused": True, "loss": False}
     else:
         assert " 0 wrong" in single
@@ -256,7 +256,7 @@ def test_a_free_run_that_decays_slowly(tmp_path: Path, poles: tuple[float, ...])
     single, refused = prove(tmp_path, texts, "-DTC_FLOAT"), b"too coarse for this model" in texts["tc_x.md"]
     assert ("single precision is too coarse for this model" in single) == refused
     assert refused or " 0 wrong" in single
-    assert refused == (poles == (0.9999, 0.9999))
+    assert refused == (poles in ((0.999, 0.999), (0.9999, 0.9999)))
 
 
 def test_the_other_proofs_of_it_allow_as_much() -> None:

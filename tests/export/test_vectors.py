@@ -53,10 +53,10 @@ def test_it_passes_under_sanitizers_as_its_page_says(tmp_path: Path, files: dict
 @pytest.mark.parametrize(
     ("was", "becomes"),
     [
-        (r"c_jump_limit\[(\d+)\] = \{TC\(", r"c_jump_limit[\1] = {TC(0.001 + "),  # a number that decides only
-        (r"(c_shape\[\d+\]\[\d+\]\[\d+\] = \{\{\{\(?-?TC\()", r"\g<1>1"),
+        (r"c_jump_limit\[(\d+)\] = \{\s*TC\(", r"c_jump_limit[\1] = {TC(0.001 + "),  # a number that decides only
+        (r"(c_shape\[\d+\]\[\d+\]\[\d+\] = \{(?:[\s{]|/\*.*?\*/)*\(?-?TC\()", r"\g<1>1"),
         (r"c_hold = (\d+)\.0", r"c_hold = \1.1"),
-        (r"c_may_lose\[(\d+)\]\[(\d+)\] = \{\{1", r"c_may_lose[\1][\2] = {{0"),
+        (r"c_may_lose\[(\d+)\]\[(\d+)\] = \{\s*\{1", r"c_may_lose[\1][\2] = {{0"),
         (r"if \(\(w->both < 0\) \|\| \(rest < w->both_rest\)\)", "if ((w->both < 0) || (rest > w->both_rest))"),
         (r"s->is_back\[i\] = fits;", "s->is_back[i] = !fits;"),
         (r"s->rejected = 3;", "s->rejected = 2;"),

@@ -204,7 +204,7 @@ def add_check(sources: Sources) -> tuple[Sources, float]:
 def _numbers(text: str) -> list[float]:
     """Return the numbers of a table."""
     plain = re.sub(r"TC_ROUNDED\(\s*([^,]+),[^()]*\)", r"\1", text)
-    return [float(v) for v in re.sub(r"TC\(|[(){}\s]", "", plain).split(",")]
+    return [float(v) for v in re.sub(r"TC\(|[(){}\s]", "", plain).split(",") if v]
 
 
 def write_test(

@@ -158,10 +158,10 @@ def write_test(
     checks = [_part(name, scl), _state(tables, name, scl)] if sensors or units else []
     tables_ = next((u.declaration for u in units if u.name == f"{name}_tables"), "")
     if tables_:
-        found = _VALUED.findall(tables_)
+        found = _VALUED.findall(re.sub(r"\(\*.*?\*\)", "", tables_, flags=re.DOTALL))
         checks.append(_sum(name, "tables", [(m, kind, int(last or -1) + 1, "") for m, last, kind, _ in found], scl))
         flags = {"TRUE": "1", "FALSE": "0"}
-        lists = [[float(flags.get(v, v)) for v in re.split(r",\s*", text.strip("[]"))] for *_, text in found]
+        lists = [[float(flags.get(v, v)) for v in re.split(r"[,\s]+", text.strip("[] \n")) if v] for *_, text in found]
         sizes["total"], sizes["check"] = number(add_up(lists)), quoted(f"{name}_test_tables", scl)
     body = body.replace("{tables}", _TABLES.format(**sizes) if tables_ else "")
     return [vectors, *checks, SourceUnit(f"{name}_test", "\n".join(parts), body, "END_FUNCTION_BLOCK")]
