@@ -117,6 +117,13 @@ def test_a_file_is_dropped_understood_changed_and_removed(tmp_path: Path) -> Non
         assert {c["heading"]: c["kind"] for c in back["columns"]}["x_um"] == "ignored"
         assert (await client.get(f"/{TOKEN}/api/recordings/{name}")).json() == back
         assert (await client.post(f"/{TOKEN}/api/undo/{name}")).status_code == 422
+        moved = (await client.post(f"/{TOKEN}/api/uses/{name}?to=assess")).json()["settings"]
+        assert (len(moved["recordings"]), moved["assess"]) == (1, [{"file": name, "mapping": f"{name}.toml"}])
+        assert (await client.post(f"/{TOKEN}/api/uses/{name}?to=elsewhere")).status_code == 422
+        back_again = (await client.post(f"/{TOKEN}/api/uses/{name}?to=recordings")).json()["settings"]
+        assert "assess" not in back_again
+        joined = (await client.put(f"/{TOKEN}/api/settings", json={"join": {}})).json()["settings"]
+        assert joined["join"] == {}
         left = (await client.delete(f"/{TOKEN}/api/recordings/{name}")).json()["settings"]["recordings"]
         assert [r["file"] for r in left] == ["files/Prüfung 1-2.csv"]
         assert (folder / name).exists()

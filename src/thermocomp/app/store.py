@@ -135,19 +135,16 @@ class Store:
             self.replace(NAME, tomlkit.dumps(document))
         return f"files/{path.name}"
 
-    async def remove(self, name: str) -> None:
-        """Take a recording out of the settings; its file stays in the folder."""
+    async def move(self, name: str, to: str = "") -> None:
+        """Move a recording to a list of the settings; to none: its file stays in the folder."""
         async with self.editing:
             document = self.document()
-            self.entry(document, name)
+            table = self.entry(document, name).unwrap()
             for key in ("recordings", "assess"):
-                kept = [table for table in document.get(key, ()) if table.get("file") != name]
+                kept = [t.unwrap() for t in document.get(key, ()) if t.get("file") != name]
                 document.pop(key, None)
-                if kept:
-                    tables = tomlkit.aot()
-                    for table in kept:
-                        tables.append(table)
-                    document[key] = tables
+                if kept := [*kept, *([table] if key == to else [])]:
+                    document[key] = kept
             self.replace(NAME, tomlkit.dumps(document))
 
     def _same(self, size: int, digest: bytes) -> str:

@@ -7,7 +7,7 @@ import secrets
 import time
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import jinja2
 import tomlkit
@@ -106,7 +106,12 @@ def _files(store: Store) -> APIRouter:
 
     @router.delete("/api/recordings/{name:path}")
     async def remove(name: str) -> Json:
-        await store.remove(name)
+        await store.move(name)
+        return Json(_state(store))
+
+    @router.post("/api/uses/{name:path}")
+    async def use(name: str, to: Literal["recordings", "assess"]) -> Json:
+        await store.move(name, to)
         return Json(_state(store))
 
     @router.post("/api/undo/{name:path}")

@@ -41,6 +41,8 @@ const answer = quietly(async (name, remedies) => {
 
 const removeFile = quietly(async name => { delete seen[name]; render(await api(place(name), "DELETE")); });
 
+const useFile = quietly(async (name, to) => render(await api(`api/uses/${name.split("/").map(encodeURIComponent).join("/")}?to=${to}`, "POST")));
+
 const undo = quietly(async name => { seen[name] = await api("api/undo/" + name.split("/").map(encodeURIComponent).join("/"), "POST"); draw(name); });
 
 function choices(name, options) {
@@ -50,7 +52,10 @@ function choices(name, options) {
 function draw(name) {  // the card of a recording
   const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
   const remove = button("Remove", () => removeFile(name)); remove.title = "The file stays in the project's folder.";
-  card.replaceChildren(element("h2", name.replace(/^files\//, "") + " ", "", remove));
+  const use = element("select"), assessed = (state.settings.assess || []).some(r => r.file === name);
+  use.append(new Option("learn from it", "recordings", false, !assessed), new Option("only assess the model on it", "assess", false, assessed));
+  use.addEventListener("change", () => useFile(name, use.value)); use.setAttribute("aria-label", `use of ${name}`);
+  card.replaceChildren(element("h2", name.replace(/^files\//, "") + " ", "", use, " ", remove));
   if (!found) { card.append(element("p", "reading ...", "quiet")); return; }
   const undoing = found.mapping ? button("Undo the last change", () => undo(name)) : "";
   if (found.error) {
@@ -97,14 +102,15 @@ function changeColumn(name, c) {  // dialog: quantity, unit, sensitivity
 const columnsOf = name => (seen[name] && seen[name].columns) || [];
 
 const files = quietly(async () => {
-  const named = (state.settings.recordings || []).map(r => r.file), box = $("recordings");
+  const learned = state.settings.recordings || [], named = [...learned, ...(state.settings.assess || [])].map(r => r.file), box = $("recordings");
+  $("joining").hidden = learned.length < 2; $("join").checked = Boolean(state.settings.join);
   for (const card of [...box.children]) if (!named.includes(card.dataset.file)) card.remove();
   for (const name of named) {
     if (box.querySelector(`[data-file="${CSS.escape(name)}"]`)) continue;
     const card = element("article", "", "card"); card.dataset.file = name; box.append(card); draw(name);
     if (!seen[name]) { seen[name] = await api(place(name)); draw(name); }
   }
-  $("to-judge").hidden = !named.length;
+  $("to-judge").hidden = !learned.length;
 });
 
 // -- judging -----------------------------------------------------------------------------------------------------------
@@ -214,6 +220,7 @@ tabs.forEach((tab, k) => {
 });
 $("chosen").addEventListener("change", e => { dropFiles([...e.target.files]); e.target.value = ""; });
 for (const kind of ["dragover", "dragleave", "drop"]) $("drop").addEventListener(kind, e => { e.preventDefault(); $("drop").classList.toggle("over", kind === "dragover"); if (kind === "drop") dropFiles([...e.dataTransfer.files]); });
+$("join").addEventListener("change", quietly(e => api("api/settings", "PUT", { join: e.target.checked ? {} : null })));
 $("to-judge").addEventListener("click", () => open($("tab-judge")));
 $("settings").addEventListener("submit", startRun);
 $("target").addEventListener("submit", exportModels);
