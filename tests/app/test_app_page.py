@@ -151,6 +151,20 @@ def test_a_hopeless_file_says_what_to_do(tmp_path: Path, name: str, content: byt
     run(tmp_path / "project", work)
 
 
+def test_a_guess_is_kept_as_the_mapping(tmp_path: Path) -> None:
+    rows = "\n".join(f"{60 * k};{20 + 0.1 * k:.1f};{0.5 * k:.1f}" for k in range(40))
+    content = f"time_s;Lager;z_um\n{rows}\n".encode()
+
+    async def work(client: httpx.AsyncClient) -> None:
+        found = (await client.put(f"/{TOKEN}/api/drop/drift.csv", content=content)).json()
+        assert {c["heading"]: c["kind"] for c in found["columns"]}["Lager"] == "temperature"
+        project = (await client.get(f"/{TOKEN}/api/project")).json()
+        assert project["settings"]["recordings"] == [{"file": DRIFT, "mapping": f"{DRIFT}.toml"}]
+        assert (await client.get(f"/{TOKEN}/api/recordings/{DRIFT}")).json() == found
+
+    run(tmp_path / "project", work)
+
+
 @pytest.mark.parametrize(
     ("name", "kept"),
     [

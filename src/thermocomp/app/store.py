@@ -127,13 +127,23 @@ class Store:
                     file.write(part)
             if same := self._same(size, whole.digest()):
                 raise InputError(f"{name}: the project has this file already, as {same}")
+        return f"files/{path.name}"
+
+    async def adopt(self, name: str) -> dict[str, Any]:
+        """Add a received file to the recordings, with a mapping that takes the best guesses, and return its preview."""
+        path = find_inside(self.folder, name)
+        task = {"task": "preview", "file": str(path), "mapping": "", "guess": True, "answers": []}
+        found = await self.workers.ask(task)
         async with self.editing:
-            document = self.document()
-            table = tomlkit.table()
-            table["file"] = f"files/{path.name}"
+            document, table = self.document(), tomlkit.table()
+            table["file"] = name
+            if found["mapping"]:
+                self.replace(f"{name}.toml", found["mapping"])
+                table["mapping"] = f"{name}.toml"
             document.setdefault("recordings", tomlkit.aot()).append(table)
             self.replace(NAME, tomlkit.dumps(document))
-        return f"files/{path.name}"
+        self._read[name] = ((path.stat().st_mtime_ns, path.stat().st_size, found["mapping"]), found)
+        return found
 
     async def move(self, name: str, to: str = "") -> None:
         """Move a recording to a list of the settings; to none: its file stays in the folder."""
@@ -198,14 +208,14 @@ class Store:
             return found[1]
         raise InputError(f"{name}: the file cannot be read")
 
-    async def answer(self, name: str, answers: Sequence[Mapping[str, Any]], *, guess: bool) -> dict[str, Any]:
+    async def answer(self, name: str, answers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         """Add entries to the mapping of a recording, and return its preview."""
         async with self.editing:
             table = self.entry(document := self.document(), name)
             mapping = str(table.get("mapping", ""))
             path, text = find_inside(self.folder, name), self._text(mapping)
             found = await self.workers.ask(
-                {"task": "preview", "file": str(path), "mapping": text, "guess": guess, "answers": [*answers]}
+                {"task": "preview", "file": str(path), "mapping": text, "guess": False, "answers": [*answers]}
             )
             if found["mapping"] != text:
                 self.replace(wanted := mapping or f"{name}.toml", found["mapping"])

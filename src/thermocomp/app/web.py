@@ -94,7 +94,7 @@ def _files(store: Store) -> APIRouter:
     @router.put("/api/drop/{name}")
     async def drop(name: str, request: Request) -> Json:
         file = await store.receive(name, request.stream())
-        return Json({"file": file, **await store.answer(file, [], guess=True)})
+        return Json({"file": file, **await store.adopt(file)})
 
     @router.get("/api/recordings/{name:path}")
     async def look(name: str) -> Json:
@@ -102,7 +102,7 @@ def _files(store: Store) -> APIRouter:
 
     @router.post("/api/recordings/{name:path}")
     async def answer(name: str, answers: Annotated[list[dict[str, Any]], Body()]) -> Json:
-        return Json({"file": name, **await store.answer(name, answers, guess=False)})
+        return Json({"file": name, **await store.answer(name, answers)})
 
     @router.delete("/api/recordings/{name:path}")
     async def remove(name: str) -> Json:
