@@ -113,6 +113,18 @@ def test_what_fails_says_why_and_stays(tmp_path: Path) -> None:
     assert rerun(folder).number == 2
 
 
+def test_a_failed_export_keeps_the_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = small_project(tmp_path / "project", QUICK + '\n[export]\nto = "nowhere"\n')
+    with pytest.raises(InputError, match="nowhere"):
+        rerun(folder)
+    (run,) = runs_of(folder)
+    assert (run.read()["state"], steps(run)) == ("failed", ["check", "compare", "fit"])
+    change(folder, "nowhere", "c99")
+    monkeypatch.setattr(running, "compare", lambda *_, **__: pytest.fail("it was compared again"))
+    assert rerun(folder).number == 1
+    assert (run.read()["state"], run.read()["error"], steps(run)[-1]) == ("done", "", "export")
+
+
 def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path: Path) -> None:
     folder = small_project(tmp_path / "project")
     run = rerun(folder)

@@ -83,7 +83,8 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
     fingerprint = project.fingerprint()
     last = next(reversed(runs_of(project.folder)), None)
     found = {} if last is None else last.read()
-    if last is None or again or found["fingerprint"] != fingerprint or found["state"] == "failed":
+    learned = any(step["name"] == "fit" for step in found.get("steps", ()))
+    if last is None or again or found["fingerprint"] != fingerprint or (found["state"] == "failed" and not learned):
         folder = new_run(project.folder)
         folder.state.fingerprint, folder.state.version = fingerprint, __version__
     else:
@@ -177,7 +178,7 @@ class ProjectRun:
     def _export(self) -> tuple[list[str], str]:
         options = self.settings.export
         assert options is not None
-        reduced = self._read(self.settings.recordings) if find_target(options.to).shape else None
+        reduced = self._recordings() if find_target(options.to).shape else None
         found = export(self._model, options.to, reduced, limits=self.settings.limits, **given(options, ("to",)))
         folder = free(str(self.folder.path / "-".join(["export", options.to, *filter(None, [options.dialect])])))
         found.save(folder)
