@@ -2,7 +2,7 @@
 
 For machines that share a linear model with lags (`LinearDynamic`): the same gate for each value, model and limits as in
 `Compensator.step`, as array operations over all machines at once. Tasks for individual machines (zeros, commands,
-restarts, sensor faults, probings) are not included; use a `Compensator` for these.
+restarts, sensor faults, sources that have stopped, probings) are not included; use a `Compensator` for these.
 """
 
 from dataclasses import dataclass, field
