@@ -145,7 +145,9 @@ def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path: Path) -> None:
 
 def test_a_run_obeys(tmp_path: Path) -> None:
     """A run in a process of its own, asked to stop by a file, as the page does."""
-    folder = small_project(tmp_path / "project", QUICK.replace("robustness = false\n", "").replace('"ols"', '"mlp"'))
+    folder = small_project(
+        tmp_path / "project", QUICK.replace("robustness = false\n", "").replace('"ols"', '"mlp", "ppr", "gp", "ace"')
+    )
     words = [sys.executable, "-m", "thermocomp", "run", str(folder)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         try:

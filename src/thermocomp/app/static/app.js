@@ -10,6 +10,7 @@ let state = null, seen = {}, drawn = 0, shownRun = "", figures = 0;
 
 function alarm(text = "") { $("alarm").textContent = text; $("alarm").hidden = !text; if (text) $("alarm").scrollIntoView({ block: "nearest" }); }
 function element(tag, text = "", kind = "", ...inner) { const e = make(tag, kind, text); e.append(...inner); return e; }
+function scrolling(inner) { const e = element("div", "", "scroll", inner); e.tabIndex = 0; e.setAttribute("role", "region"); e.setAttribute("aria-label", "table"); return e; }
 function button(text, run, kind = "") { const b = element("button", text, kind); b.type = "button"; b.addEventListener("click", run); return b; }
 async function api(path, method = "GET", body, raw = false) {
   alarm();
@@ -62,7 +63,7 @@ function draw(name) {  // the card of a recording
     card.append(element("p", found.error, "trouble"), found.options.length ? element("p", "Which of these is right?") : element("p", "This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading.", "quiet"), choices(name, found.options), undoing);
     return;
   }
-  card.append(element("p", found.summary), element("div", "", "scroll", preview(name, found.columns)));
+  card.append(element("p", found.summary), scrolling(preview(name, found.columns)));
   for (const q of found.questions) card.append(element("p", q.text, "warning"), choices(name, q.options));
   if (found.findings.length) card.append(element("h3", "Found in the data"), element("ol", "", "", ...found.findings.map(f => {
     const line = element("li", "", f.severity, element("strong", f.severity + " "), `${f.channel} ${f.text} `);
@@ -164,7 +165,7 @@ const verdict = quietly(async run => {
   const line = m => [m.target, (method(m.target) || { model: m.family }).model, m.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason];
   const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
   $("verdict").replaceChildren(element("h2", `Result of run ${run.number}, on unseen data`),
-    element("div", "", "scroll", element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
+    scrolling(element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
     element("p", "", "", link(run, "comparison.html", "All methods, with curves and reasons"), " · ", link(run, "check.html", "Check of the data"), " · ", link(run, "model.json", "Model file")));
   deployForm(run);
 });
