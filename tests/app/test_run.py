@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from projects import QUICK, small_project
@@ -16,6 +17,7 @@ from thermocomp.app.project import Project
 from thermocomp.app.runfolder import SILENT, RunFolder, runs_of
 from thermocomp.app.running import ProjectRun, run_project
 from thermocomp.cli.app import run as command
+from thermocomp.core.alone import alone
 from thermocomp.core.exceptions import InputError
 
 
@@ -123,6 +125,30 @@ def test_a_failed_export_keeps_the_model(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(running, "compare", lambda *_, **__: pytest.fail("it was compared again"))
     assert rerun(folder).number == 1
     assert (run.read()["state"], run.read()["error"], steps(run)[-1]) == ("done", "", "export")
+
+
+def test_a_file_that_changes_meanwhile_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = small_project(tmp_path / "project")
+    drift = folder / "files" / "drift.csv"
+
+    def changing(*args: Any, **given: Any) -> Any:
+        drift.write_bytes(drift.read_bytes() + b"\n")
+        return tc.compare(*args, **given)
+
+    monkeypatch.setattr(running, "compare", changing)
+    with pytest.raises(InputError, match="changed during the run"):
+        rerun(folder)
+    assert not (folder / "runs" / "1" / "model.json").exists()
+
+
+def test_a_run_is_for_one_process(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    run = rerun(folder)
+    change(folder, "[compare]", '[export]\nto = "c99"\n\n[compare]')
+    with alone(run.path / "run.json"), pytest.raises(InputError, match="another thermocomp process"):
+        rerun(folder)
+    assert run.read()["state"] == "done"
+    assert steps(rerun(folder))[-1] == "export"
 
 
 def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path: Path) -> None:

@@ -135,7 +135,10 @@ def test_the_comment_says_what_counts(compensator: Compensator, tables: Tables) 
         first, last = (model.step(model.init([i.reference for i in model.inputs]), row, 1.0)[1] for row in rows)
         assert float(change) == pytest.approx(float(last - first), rel=6e-3)
     text = " ".join(told)
-    assert "Sensors that must not fail: t3_C, spindle_rpm for z_um" in text or "must not fail: t3_C for z_um" in text
+    assert (
+        "Sensors that must not be missing: t3_C, spindle_rpm for z_um" in text
+        or "not be missing: t3_C for z_um" in text
+    )
     for word in ("held for 120 s", "AT POWER-UP", "25 %", "goes on with these", "TO SWITCH IT OFF: age := 1.0E+9"):
         assert word in text
     bare = Compensator.of([growing("z_um", 1.0)], WIDE)

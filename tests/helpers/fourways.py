@@ -13,12 +13,11 @@ from drawnreadings import Stream
 from numpy.typing import NDArray
 
 from thermocomp.core.bounds import GAP
-from thermocomp.core.inputs import Input
 from thermocomp.core.reading import Reading
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.export.c99.c99 import translate
 from thermocomp.export.st.structuredtext import translate as translate_st
-from thermocomp.export.vectors import NOTHING, STATUS, TOLD_COLD
+from thermocomp.export.vectors import NOTHING, STATUS, TOLD_COLD, count_outside, reason_code
 from thermocomp.judging.compiled.intermediate import write_functions
 from thermocomp.judging.compiled.machine import compile_module
 from thermocomp.live import statefile
@@ -80,7 +79,7 @@ def run_numpy(compensator: Compensator, tables: Tables, stream: Stream) -> Said:
         reading = Reading(now - age, table, counter=counter)
         state, said = compensator.step(state, reading, now, tick=time if good else math.nan)
         if not said.rejected:
-            outside = len(_outside(tables, state))
+            outside = count_outside(tables, state)
         decisions.append([*_decisions(tables, said), outside])
         each = said.corrections.values()
         deviations = [float(s.deviation) for s in state.models]
@@ -106,24 +105,7 @@ def _decisions(tables: Tables, said: Compensated) -> list[int]:
         catches_up = word == "restarting" and reason.startswith("compensation did not run")
         status.append(STATUS.index("active" if catches_up else word))
     fault = [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors]
-    return [*status, *fault, rejected(said.rejected)]
-
-
-def _outside(tables: Tables, state: CompensatorState) -> set[Input]:
-    """Return the inputs that are beyond the range of a model."""
-    pairs = zip(tables.models, state.models, strict=True)
-    return {i for m, own in pairs for i, out in zip(m.inputs, own.outside.tolist(), strict=True) if out}
-
-
-def rejected(why: str) -> int:
-    """Return the code of a reason: 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped."""
-    if not why:
-        return 0
-    if why.endswith("the source has stopped"):
-        return 4
-    if "plausible as a start" in why:
-        return 3
-    return 2 if why.endswith((" is missing", " is not plausible")) else 1
+    return [*status, *fault, reason_code(said.rejected)]
 
 
 # -- the program -------------------------------------------------------------------------------------------------------

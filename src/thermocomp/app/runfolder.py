@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from thermocomp.core.alone import alone
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import write_text
 
@@ -94,7 +95,7 @@ class RunFolder:
             found: dict[str, Any] = json.loads((self.path / "run.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):  # created, and killed before the first state
             found = asdict(RunState(state="stopped"))
-        if found["state"] == "running" and time.time() - found["seen"] > SILENT:
+        if found["state"] == "running" and abs(time.time() - found["seen"]) > SILENT:
             found |= {"state": "stopped", "error": "the process ended without a word; start it again to continue"}
         return {"number": self.number, **found}
 
@@ -118,7 +119,12 @@ class RunFolder:
 
     @contextmanager
     def working(self) -> Iterator[None]:
-        """Write the state regularly, obey `ask_to_stop`, and write how the work ended."""
+        """Write the state regularly, obey `ask_to_stop`, and write how the work ended; for one process at a time."""
+        with alone(self.path / "run.json"), self._beating():
+            yield
+
+    @contextmanager
+    def _beating(self) -> Iterator[None]:
         (self.path / _STOP).unlink(missing_ok=True)
         ended = threading.Event()
         self.state.state, self.state.error = "running", ""

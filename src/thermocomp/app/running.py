@@ -171,6 +171,8 @@ class ProjectRun:
 
     def _fit(self) -> tuple[list[str], str]:
         assert self.compared is not None
+        if self.project.fingerprint() != self.folder.state.fingerprint:
+            raise InputError(f"{self.project.file}: a recording or mapping was changed during the run; start it again")
         fit = self.settings.fit
         self.fitted = found = self.compared.fit(dict(fit.model), accept_unproven=fit.accept_unproven or None)
         return self._write(found, (found.save, "model.json"))

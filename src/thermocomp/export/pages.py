@@ -16,8 +16,8 @@ _POWER = """The temperatures of a warm machine must not become the zero. After a
    than {hold:g} s without power the corrections take their new values at once, as no axis is referenced yet; otherwise,
    and without usable readings in the first {reading_age:g} s, they continue from the retained ones at their rate.
 2. **The machine was off for more than {cold:.1f} h**: it is cold, and starts by itself.
-3. **It is told cold**: by a person, or by a signal that is TRUE on a cold machine only. The temperatures from then on
-   become the zero, {wait}.
+3. **A signal says that it is cold**: a person's, or one that is TRUE on a cold machine only. The temperatures from
+   then on become the zero, {wait}.
 4. **A correction is re-zeroed**: with the deviation (actual minus commanded) that a probe measures, or with 0 if the
    datums were set anew on the machine as it is. It takes effect once the temperatures are averaged, {wait}. A speed
    whose heat the monitoring misses, since the machine is warm already, holds the correction again: best measure with
@@ -36,7 +36,7 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
     Parameters
     ----------
     kept, cold, off : str
-        How a state is retained, how the code is told that the machine is cold, and how it is switched off.
+        How a state is retained, how a signal says that the machine is cold, and how the code is switched off.
     """
     limits, values = compensator.limits, tables.values
     held = f"held for {limits.hold:g} s, then decays to 0 with a time constant of {limits.fade:g} s"
@@ -58,10 +58,12 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
             needs.setdefault(", ".join(names) or "none", []).append(model.target)
         needed = [f"{sensors} for {', '.join(targets)}" for sensors, targets in needs.items()]
         found.append(
-            "A SENSOR THAT FAILS (fault above 0: missing, stuck, stepped, swapped, implausible) is replaced by its "
-            "prediction from the others, and read again when it agrees with that. A correction goes on if its model "
-            f"was judged to be better without the sensor than no compensation; otherwise it is {held}. Sensors that "
-            f"must not fail: {'; '.join(needed)}."
+            "A SENSOR THAT FAILS (fault above 0) is replaced by its prediction from the others. It is used again when "
+            "it agrees with that, if it was missing (1) or unexplained (6); a temperature that was stepped (2), stuck "
+            "(3) or swapped (5) must be repaired, and is used again after a cold start or restart. A correction goes "
+            "on if its model was judged to be better without the sensor than without compensation; otherwise it is "
+            f"{held}. Sensors that must not be missing: {'; '.join(needed)}. A speed that is wrong (4) holds the "
+            "corrections that depend on it; two sensors that fail at once can hold one, too."
         )
     else:
         found.append(
@@ -70,16 +72,26 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
         )
     found += [
         "AT POWER-UP status is 5 and the correction 0, until one of these: a retained state continues "
-        f"({kept}, at most {values['resumable'] / 3600.0:g} h without power); the machine was off for more than "
-        f"{values['cold_after'] / 3600.0:.1f} h; it is told cold ({cold}); the correction is re-zeroed "
-        "by a measurement.",
+        f"({kept}, at most {values['resumable'] / 3600.0:g} h without power; after more than {limits.hold:g} s the "
+        "correction is taken at once, so call it before the axes are referenced); the machine was off, without such a "
+        f"state, for more than {values['cold_after'] / 3600.0:.1f} h; a signal says that it is cold ({cold}); the "
+        "correction is re-zeroed by a measurement.",
         "BEYOND THE TRAINED RANGE inputs count as at its end (input_low, input_high: the range and "
         f"{_listed(f'{100.0 * m.support.margin:g} %' for m in compensator.models)} of it on either side); outside "
-        f"counts them. Then a model {_listed(_POLICIES[m.support.policy] for m in compensator.models)}. A reading far "
-        "beyond (room) is not used: rejected = 2.",
+        f"counts them. Then a model {_listed(_POLICIES[m.support.policy] for m in compensator.models)}. A value far "
+        f"beyond (room) {'counts as missing' if tables.sensors else 'is not used: rejected = 2'}.",
+        "CALL IT every ten seconds, or with each new reading. " + _each_call(compensator),
         f"TO SWITCH IT OFF: {off}; the correction is {held}. Do not write 0 in its place: the axis would jump.",
     ]
     return found
+
+
+def _each_call(compensator: Compensator) -> str:
+    return (
+        "A call without a newer reading (its age has grown) is rejected, and a correction moves by at most "
+        f"{compensator.limits.rate:g} um/s times the time since the previous call: many calls between two readings "
+        "make it slow."
+    )
 
 
 def _changes(model: ErrorModel) -> dict[str, float]:
@@ -141,6 +153,7 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         f"{zeroing.at_rest:g} s while the spindle is stopped; until then the correction does not change."
         if tables.sizes["has_zero"]
         else "No input is relative to the start.",
+        "each_call": _each_call(compensator),
         "geometry": _geometry(tables, of) if slopes else "",
         "sign": "With the spindle stopped and a dial indicator on the axis, send +20 um to the controller instead of a "
         "correction:\nthe axis must move by 0.02 mm in its positive direction, and back with 0. If it moves the other "

@@ -117,7 +117,7 @@ def replay(
         waits = {t for t, idle in state.idle.items() if idle <= compensator.limits.reading_age}
         resumed = {t for t in resumed & waits if said.states[t].word == "holding"}
         if not said.rejected:
-            outside = _count_outside(tables, state)
+            outside = count_outside(tables, state)
             warm = machine_seems_warm(compensator, state) if starting else warm
         for target in [t for t in waiting if t in state.raw]:
             state = rezero_measured(compensator, state, target, clock, waiting.pop(target))
@@ -133,7 +133,7 @@ def replay(
                 [WORDS.index(said.failed.get(s, WORDS[0])) for s in tables.sensors],
                 not said.rejected,
                 warm,
-                _rejected(said.rejected),
+                reason_code(said.rejected),
                 outside,
                 _check_inner(state),
             )
@@ -157,7 +157,7 @@ def replay(
     )
 
 
-def _rejected(why: str) -> int:
+def reason_code(why: str) -> int:
     """Return the block's number of a reason: 1 its time, 2 a value, 3 not a valid start, 4 the source has stopped."""
     if not why:
         return 0
@@ -168,7 +168,7 @@ def _rejected(why: str) -> int:
     return 2 if why.endswith((" is missing", " is not plausible")) else 1
 
 
-def _count_outside(tables: Tables, state: CompensatorState) -> int:
+def count_outside(tables: Tables, state: CompensatorState) -> int:
     """Return the number of inputs beyond the range of a model."""
     pairs = zip(tables.models, state.models, strict=True)
     return len({i for m, own in pairs for i, out in zip(m.inputs, own.outside.tolist(), strict=True) if out})

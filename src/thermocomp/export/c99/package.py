@@ -39,6 +39,7 @@ same precision, otherwise they do not link. Never compile with `-ffast-math`.
 ## Run it
 
 Call it cyclically, every ten seconds, with the time since the previous call, measured or fixed.
+{each_call}
 
     #include "{name}.h"
     #include <math.h>                          /* NAN */

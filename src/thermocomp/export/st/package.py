@@ -11,7 +11,7 @@ from thermocomp.export.pages import describe, explain
 from thermocomp.export.recorded import find_readings
 from thermocomp.export.st.plcopen import write_project
 from thermocomp.export.st.secondedition import adapt
-from thermocomp.export.st.structuredtext import SourceUnit, translate
+from thermocomp.export.st.structuredtext import INPUTS, SourceUnit, translate
 from thermocomp.export.st.ststatements import BAGS, Dialect, comment, wrapped
 from thermocomp.export.st.sttest import allow, write_test
 from thermocomp.export.target import Target
@@ -63,19 +63,13 @@ up all tables and limits. Remove the test and its vectors afterwards.
 ## Run it
 
 Call one instance of `{name}` in a cyclic task with a cycle time of ten seconds. It needs LREAL.
+{each_call}
 
 | input | meaning |
 |---|---|
 | `value[k]` | see below |
 | `good[k]` | FALSE for a sensor without a reading or with a reported failure |
-| `age` | time since the values were measured [s] |
-| `elapsed` | time since the previous call, measured or the cycle time of the task [s] |
-| `reading` | optional: number of the reading, which changes with each new one, from 1; 0: they are not numbered |
-| `off_time` | at the first call: time without power [s], 0 if it is unknown |
-| `cold` | TRUE: the machine is cold; without effect once all references are known |
-| `restart` | rising edge: the present temperatures become the zero; the corrections continue without a jump |
-| `rezero`, `target`, `remaining` | rising edge: `correction[target]` continues from its value minus `remaining` [um] |
-| `first` | TRUE: the call counts as the first one after a power-up (for the test) |
+{other}
 | `kept` | in and out: the retained state, a variable of type `{name}_state` |
 
 {stopped}
@@ -166,6 +160,7 @@ def write_blocks(
         calls=len(readings.age),
         recorded=f", and readings of {recording.name}" if recording else "",
         tolerance=allow(tables),
+        other="\n".join(f"| `{i}` | {about} |" for i, (_, about) in INPUTS.items()),
         **describe(compensator, tables),
     )
     if dialect == "twincat":

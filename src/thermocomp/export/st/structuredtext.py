@@ -41,16 +41,22 @@ OUTPUTS: dict[str, str] = {
 }
 #: inputs of the function block that are not arrays, and their types
 INPUTS = {
-    "age": "LREAL",
-    "elapsed": "LREAL",
-    "reading": "LREAL",
-    "off_time": "LREAL",
-    "cold": "BOOL",
-    "restart": "BOOL",
-    "rezero": "BOOL",
-    "target": "DINT",
-    "remaining": "LREAL",
-    "first": "BOOL",
+    "age": ("LREAL", "time since the values were measured [s]"),
+    "elapsed": ("LREAL", "time since the previous call, measured or the cycle time of the task [s]"),
+    "reading": (
+        "LREAL",
+        "optional: number of the reading, which changes with each new one, from 1; 0: they are not numbered",
+    ),
+    "off_time": ("LREAL", "at the first call: time without power [s], 0 if it is unknown"),
+    "cold": ("BOOL", "TRUE: the machine is cold; without effect once all references are known"),
+    "restart": (
+        "BOOL",
+        "rising edge: the present temperatures become the zero; the corrections continue without a jump",
+    ),
+    "rezero": ("BOOL", "rising edge: `correction[target]` continues from its value minus `remaining` [um]"),
+    "target": ("DINT", "number of the correction that is re-zeroed"),
+    "remaining": ("LREAL", "deviation that remains there, actual minus commanded [um]"),
+    "first": ("BOOL", "TRUE: the call counts as the first one after a power-up (for the test)"),
 }
 #: variables of the function block that it does not retain
 _OWN = {"running": "BOOL", "restarted": "BOOL", "rezeroed": "BOOL", "unsaved": "LREAL"}
@@ -232,13 +238,17 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
     parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(SCL if scl else [])]
     parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
     parts += [wrapped(f"(* correction [um], by number: {comment(_listed(tables.targets))} *)")]
+    if tables.sensors:  # in another order than the values
+        parts += [wrapped(f"(* fault, by number: {comment(_listed(tables.sensors))} *)")]
+    parts += [wrapped(f"(* {i}: {about.replace('`', '')} *)") for i, (_, about) in INPUTS.items()]
+    parts += [f"(* kept: the retained state: a variable of type {name}_state with RETAIN or PERSISTENT *)"]
     parts += [
         section(
             "VAR_INPUT",
             {
                 "value": array("real", n),
                 "good": f"{array('bool', n)} := [{', '.join(['TRUE'] * n)}]",
-                **INPUTS,
+                **{i: kind for i, (kind, _) in INPUTS.items()},
             },
         ),
         section(
