@@ -171,7 +171,8 @@ def test_a_killed_run_is_told_from_one_that_goes_on(tmp_path: Path) -> None:
 
 #: a run in a process of its own whose comparison takes long
 SLOW = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.SIG_IGN if sys.argv[2] == "background" else signal.default_int_handler)
 from thermocomp.app import running
 from thermocomp.cli.app import run
 running.compare = lambda *_, **__: time.sleep(300.0)
@@ -179,10 +180,11 @@ sys.exit(run(["run", sys.argv[1]]))
 """
 
 
-def test_a_run_obeys(tmp_path: Path) -> None:
-    """Asked to stop by a file, as the page does."""
+@pytest.mark.parametrize("started", ["foreground", "background"])
+def test_a_run_obeys(tmp_path: Path, started: str) -> None:
+    """Asked to stop by a file, as the page does; a shell lets what it starts in the background ignore interrupts."""
     folder = small_project(tmp_path / "project")
-    words = [sys.executable, "-c", SLOW, str(folder)]
+    words = [sys.executable, "-c", SLOW, str(folder), started]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         try:
             until = time.monotonic() + 120.0

@@ -141,6 +141,11 @@ class RunFolder:
 
         thread = threading.Thread(target=beat, daemon=True)
         thread.start()
+        # a process that was started in the background inherits that interrupts are ignored
+        main = threading.current_thread() is threading.main_thread()
+        ignored = main and signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        if ignored:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
             yield
             self.state.state = "done"
@@ -153,6 +158,8 @@ class RunFolder:
         finally:
             ended.set()
             thread.join()
+            if ignored:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
             self.state.ended = _now()
             self.save()
 
