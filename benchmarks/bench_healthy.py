@@ -20,7 +20,8 @@ from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.readers.mapping import read_mapping
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.runtime.watch import GOOD, WORDS, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, WORDS, begin
 from thermocomp.virtual.datasets import record
 
 TESTS = 9

@@ -29,7 +29,8 @@ from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.watch import begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import begin
 from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]

@@ -23,7 +23,8 @@ from thermocomp.core.provenance import HonestError
 from thermocomp.models.training import train
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
-from thermocomp.runtime.watch import GOOD, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, begin
 
 #: goals: ratio to the error without a watch, or excess over it [um]; ratio to that with all sensors; share of pairs
 RATIO, EXCESS, SOUND = 1.05, 0.1, 2.0

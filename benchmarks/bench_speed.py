@@ -32,7 +32,7 @@ from thermocomp.core.reading import Reading
 from thermocomp.recordings.recording import Recording
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.state import Compensated, CompensatorState
-from thermocomp.runtime.watch import UNSURE
+from thermocomp.runtime.watchstate import UNSURE
 from thermocomp.virtual.protocol import Physics
 
 FloatArray = NDArray[np.float64]

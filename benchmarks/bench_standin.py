@@ -28,7 +28,8 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime import batch
 from thermocomp.runtime.limits import fade
-from thermocomp.runtime.watch import GOOD, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, begin
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

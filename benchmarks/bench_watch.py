@@ -21,7 +21,8 @@ from thermocomp.models.watching import find_watch
 from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.runtime.watch import GOOD, SWAPPED, WatchState, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, SWAPPED, WatchState, begin
 from thermocomp.virtual.datasets import record
 
 FloatArray = NDArray[np.float64]

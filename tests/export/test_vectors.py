@@ -18,7 +18,7 @@ from thermocomp.export.vectors import TOLD_COLD, replay
 from thermocomp.files import modelfile
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.program.tables import gather
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 FACTS = Facts("model.json", "0" * 64, "0", "2026-01-01", {})
 #: as the page of the package says

@@ -26,7 +26,7 @@ from thermocomp.runtime.program.assembly import functions
 from thermocomp.runtime.program.memory import ARRAYS, FlatMemory
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.state import Compensated, CompensatorState, resume, silence
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

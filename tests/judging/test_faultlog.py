@@ -22,7 +22,7 @@ from thermocomp.recordings.starts import Start
 from thermocomp.report.bands import describe_bands
 from thermocomp.report.faults import describe_faults, describe_held
 from thermocomp.runtime.compensator import Compensator
-from thermocomp.runtime.watch import GOOD
+from thermocomp.runtime.watchstate import GOOD
 from thermocomp.virtual import datasets as virtual
 
 

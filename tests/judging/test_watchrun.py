@@ -22,7 +22,8 @@ from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.program.memory import FlatMemory
-from thermocomp.runtime.watch import SWAPPED, UNEXPLAINED, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import SWAPPED, UNEXPLAINED, begin
 from thermocomp.virtual import datasets as virtual
 
 SIX = ("t_housing_C", "t_motor_C", "t_column_front_left_C", "t_z_bearing_C", "t_table_C", "t_enclosure_C")

@@ -23,7 +23,7 @@ from thermocomp.recordings.starts import Start
 from thermocomp.report import assessed, faults
 from thermocomp.report.layout import in_um
 from thermocomp.report.sections import Section
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 
 @pytest.fixture(scope="module")

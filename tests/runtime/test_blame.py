@@ -12,7 +12,8 @@ from thermocomp.core.watch import Watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.runtime.watch import GOOD, MISSING, SWAPPED, UNEXPLAINED, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, MISSING, SWAPPED, UNEXPLAINED, begin
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]

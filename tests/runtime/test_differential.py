@@ -29,7 +29,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.fleet import Fleet
 from thermocomp.runtime.program.tables import Tables, gather
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 FloatArray = NDArray[np.float64]
 #: of an ordinary run, and of a long one: seeds of compensators, and readings of each; 34, 38 and 42 find planted faults

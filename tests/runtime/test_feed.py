@@ -25,7 +25,8 @@ from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.feed import FeedState, TemperatureFeed
 from thermocomp.runtime.state import Compensated, CompensatorState
-from thermocomp.runtime.watch import GOOD, STUCK, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, STUCK, begin
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]

@@ -8,10 +8,11 @@ import pytest
 from thermocomp.judging.compiled import rows  # noqa: F401 - has functions of the program, too
 from thermocomp.runtime.program import models, steps  # noqa: F401
 from thermocomp.runtime.program import tree as n
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, find_function, is_known, let, otherwise, record, when
 from thermocomp.runtime.program.memory import FlatMemory
 from thermocomp.runtime.program.values import Condition, flag, integer, real
-from thermocomp.runtime.program.variables import RECORDS, Constants, Kept, Work
+from thermocomp.runtime.program.variables import RECORDS, Kept, Work
 
 S, W, T = Kept(), Work(), Constants()
 

@@ -24,7 +24,8 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.limits import fade
-from thermocomp.runtime.watch import GOOD, MISSING, STEPPED, STUCK, UNEXPLAINED, WORDS, WatchState, begin, look
+from thermocomp.runtime.watch import look
+from thermocomp.runtime.watchstate import GOOD, MISSING, STEPPED, STUCK, UNEXPLAINED, WORDS, WatchState, begin
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]

@@ -15,7 +15,7 @@ from thermocomp.judging.watchrun import run_watch
 from thermocomp.models.watching import find_watch
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
-from thermocomp.runtime.watch import MISSING, OFF
+from thermocomp.runtime.watchstate import MISSING, OFF
 from thermocomp.virtual import datasets as virtual
 
 FloatArray = NDArray[np.float64]

@@ -22,7 +22,7 @@ from thermocomp.runtime.powerup import machine_seems_warm, power_up, rezero_meas
 from thermocomp.runtime.program.tables import Tables
 from thermocomp.runtime.program.variables import Kept
 from thermocomp.runtime.state import NO_ZERO, CompensatorState
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -72,7 +72,7 @@ class Answers(NamedTuple):
     slope: FloatArray  #: (n_calls, n_targets) [um/m]
     status: IntArray  #: (n_calls, n_targets), index into `STATUS`
     deviation: FloatArray  #: (n_calls, n_models)
-    fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watch.WORDS`
+    fault: IntArray  #: (n_calls, n_sensors), index into `thermocomp.runtime.watchstate.WORDS`
     passed: NDArray[np.bool_]  #: (n_calls,), whether the reading was used
     warm: NDArray[np.bool_]  #: (n_calls,), whether the machine seemed warm at its start
     why: IntArray = np.zeros(0, dtype=int)  #: (n_calls,), why the reading was not used: the block's ``rejected``

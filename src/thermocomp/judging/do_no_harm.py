@@ -297,7 +297,8 @@ class Verdict:
             return f"judge it {way}"
         n = len(self.units)
         if n < MIN_UNITS:
-            return f"record {_count(MIN_UNITS - n, 'more thermal cycle')}, at other speeds or on other days"
+            more = MIN_UNITS - n
+            return f"record {more} more thermal cycle{'s' * (more > 1)}, at other speeds or on other days"
         if self._moving < MIN_UNITS - 1:
             return "record cycles with a warm-up or a change of speed"
         return self._more_units()
@@ -397,7 +398,3 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
 def margin_of(learned: Learned, unit: str = "um") -> float:
     """Return the default of the tolerated degradation in a single cycle or file [unit]."""
     return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'' if n == 1 else 's'}"

@@ -17,7 +17,7 @@ from thermocomp.judging.results import Assessment
 from thermocomp.judging.watched import can_look, look_through, stack_watched
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
-from thermocomp.runtime.watch import GOOD, MISSING, WORDS
+from thermocomp.runtime.watchstate import GOOD, MISSING, WORDS
 
 IntArray = NDArray[np.int8]
 
@@ -26,7 +26,7 @@ class Fault(NamedTuple):
     """A period in which a sensor was not trusted."""
 
     sensor: str
-    word: str  #: see `thermocomp.runtime.watch.WORDS`
+    word: str  #: see `thermocomp.runtime.watchstate.WORDS`
     begin: float  #: time of detection, on the clock of its recording [s]
     end: float  #: time when it was trusted again, or end of the recording [s]
     returned: bool  #: whether it was trusted again
@@ -47,7 +47,7 @@ class FaultLog:
     watch : Watch
         Watch that detected the faults.
     fault : ndarray of int of shape (n_rows, n_sensors)
-        See `thermocomp.runtime.watch.WORDS`.
+        See `thermocomp.runtime.watchstate.WORDS`.
     read, stood_in : ndarray of shape (n_rows, n_sensors)
         Recorded and replacement values [their units]; nan where there was none, or the sensor was trusted.
     faults : tuple of Fault

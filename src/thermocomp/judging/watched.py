@@ -14,7 +14,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
 from thermocomp.recordings.stacking import stack
 from thermocomp.recordings.starts import Start
-from thermocomp.runtime.watch import WORDS
+from thermocomp.runtime.watchstate import WORDS
 
 
 def believe(
@@ -81,7 +81,7 @@ def look_through(watch: Watch, samples: Samples, test: int) -> tuple[NDArray[np.
     passed : ndarray of shape (n_rows, n_inputs)
         Readings passed on, in the order of the watch's inputs.
     faults : ndarray of int of shape (n_rows, n_sensors)
-        See `thermocomp.runtime.watch.WORDS`.
+        See `thermocomp.runtime.watchstate.WORDS`.
     """
     names = [c.name for c in samples.inputs]
     known = [i.name in names for i in watch.inputs]

@@ -31,7 +31,7 @@ def run_watch(
     -------
     passed : ndarray of shape (n_rows, n_inputs)
     faults : ndarray of int of shape (n_rows, n_sensors)
-        See `thermocomp.runtime.watch.WORDS`.
+        See `thermocomp.runtime.watchstate.WORDS`.
     """
     sizes, constants = constants_of_watch(watch, reference)
     memory = FlatMemory(sizes | {"ROWS": len(time)}, constants)

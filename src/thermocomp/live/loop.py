@@ -32,7 +32,7 @@ from thermocomp.runtime.adaptation import Probing
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.orders import AVERAGED, order, rezero, withdraw, zero_anew
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN, Compensated, CompensatorState, Status
-from thermocomp.runtime.watch import UNSURE
+from thermocomp.runtime.watchstate import UNSURE
 
 #: values that are older than those used by more than this are reported [s of real time]
 BEHIND = 2.0

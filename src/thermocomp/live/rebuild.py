@@ -14,7 +14,7 @@ from thermocomp.live.storedzero import StateOfOthers, StoredZero
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import find_slowest
 from thermocomp.runtime.state import CompensatorState, Reference
-from thermocomp.runtime.watch import begin
+from thermocomp.runtime.watchstate import begin
 
 #: after this multiple of its time constant, a slow state no longer depends on its first value
 FORGOTTEN = 5.0

@@ -23,7 +23,7 @@ from thermocomp.live.storedzero import StateOfOthers, StoredZero, decode_zero, z
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.feed import FeedState
 from thermocomp.runtime.state import CompensatorState
-from thermocomp.runtime.watch import WORDS, WatchState
+from thermocomp.runtime.watchstate import WORDS, WatchState
 
 KIND = jsonfile.Format("thermocomp-state", 5, "state file", "thermocomp serve")
 

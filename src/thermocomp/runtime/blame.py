@@ -27,7 +27,7 @@ def find_limits(watch: Watch, memory: FloatArray) -> FloatArray:
     Parameters
     ----------
     memory : ndarray of shape (..., n_memory)
-        See `thermocomp.runtime.watch.WatchState`.
+        See `thermocomp.runtime.watchstate.WatchState`.
     """
     lags = memory.shape[-1] - len(watch.states)
     caused = np.abs(memory[..., lags:] @ watch.read_out[1][lags:])  # by the speed
@@ -102,7 +102,7 @@ def weigh_swaps(
     x : ndarray of shape (..., n_sensors)
         Readings or their substitutes, minus the reference [degC].
     memory : ndarray of shape (..., n_memory)
-        See `thermocomp.runtime.watch.WatchState`.
+        See `thermocomp.runtime.watchstate.WatchState`.
     able : ndarray of bool of shape (..., n_sensors)
         Sensors whose readings and predictions are reliable.
     dt : ndarray of shape (..., 1)

@@ -35,7 +35,7 @@ from thermocomp.runtime.advance import Advanced, advance
 from thermocomp.runtime.clocking import place
 from thermocomp.runtime.driving import Driven, drive, rest, travel_time
 from thermocomp.runtime.feed import TemperatureFeed
-from thermocomp.runtime.gate import explain_implausible
+from thermocomp.runtime.gate import explain_implausible, explain_unjudged
 from thermocomp.runtime.geometry.straight import best_lines
 from thermocomp.runtime.geometry.volumetric import VolumetricModel
 from thermocomp.runtime.group import Group
@@ -43,7 +43,7 @@ from thermocomp.runtime.identity import remember, sift
 from thermocomp.runtime.lines import DeviationLine, constant, evaluate, straight
 from thermocomp.runtime.lookout import Lookout
 from thermocomp.runtime.state import NO_ZERO, Compensated, CompensatorState, Reference, Status
-from thermocomp.runtime.watch import WatchState, begin
+from thermocomp.runtime.watchstate import WatchState, begin
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +334,7 @@ class Compensator:
             known, most = done.learned.get(target), self.limits.magnitude
             answer = evaluate(line, self.models, stepped, times[1], known, probing, failed, zero, most)
             done.raw[target], done.deviations[target] = answer.raw, answer.deviation
-            if failed and (why := _unjudged(self.models[line.models], failed)):
+            if failed and (why := explain_unjudged(self.models[line.models], failed)):
                 done.held[target] = why  # no band either: the error without these sensors was never judged
                 continue
             if not math.isnan(answer.half_width):
@@ -398,17 +398,3 @@ class Compensator:
 def _is_negative(value: object) -> bool:
     """Return whether a value is a number below zero; what a source sends may be anything."""
     return isinstance(value, Real) and value < 0
-
-
-def _unjudged(models: Sequence[ErrorModel], failed: Mapping[str, str]) -> str:
-    """Return the reason why models must not drive a correction without the failed sensors; empty if they may do so."""
-    for model in models:
-        if wrong := model.wrong_speeds(failed):
-            return f"{wrong[0]} was wrong before that was found, and the model of {model.target} remembers it"
-        lost = [n for n in failed if n in model.sensors]
-        if lost and not model.may_lose(lost):
-            return (
-                f"without {' and '.join(lost)}, the model of {model.target} is not known to be better than no "
-                "compensation"
-            )
-    return ""

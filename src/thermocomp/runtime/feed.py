@@ -17,7 +17,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.thresholds import Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.gate import is_number
-from thermocomp.runtime.watch import GOOD, WatchState
+from thermocomp.runtime.watchstate import GOOD, WatchState
 
 #: stands for a temperature without a value; larger numbers are none
 NONE, LARGEST = 1e13, 1e12

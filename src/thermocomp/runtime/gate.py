@@ -47,6 +47,20 @@ def explain_implausible(model: ErrorModel, values: Sequence[object], reference: 
     return _no_start(undecided, model.thresholds) if undecided else ""
 
 
+def explain_unjudged(models: Sequence[ErrorModel], failed: Mapping[str, str]) -> str:
+    """Return the reason why models must not drive a correction without the failed sensors; empty if they may do so."""
+    for model in models:
+        if wrong := model.wrong_speeds(failed):
+            return f"{wrong[0]} was wrong before that was found, and the model of {model.target} remembers it"
+        lost = [n for n in failed if n in model.sensors]
+        if lost and not model.may_lose(lost):
+            return (
+                f"without {' and '.join(lost)}, the model of {model.target} is not known to be better than no "
+                "compensation"
+            )
+    return ""
+
+
 def _no_start(offsets: Sequence[tuple[Input, float]], thresholds: Thresholds) -> str:
     """Return why temperatures, relative to the zero of the training, cannot be those of a starting machine."""
     day = find_day([offset for _, offset in offsets], thresholds.zero_change)

@@ -18,7 +18,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int8]
 
-#: faults of a speed, as in `thermocomp.runtime.watch.WORDS`
+#: faults of a speed, as in `thermocomp.runtime.watchstate.WORDS`
 GOOD, MISSING, OFF = 0, 1, 4
 
 #: heat of a missing speed beyond its lagged heat, per difference of the estimate from that: the lagged heat follows the
@@ -41,7 +41,7 @@ class HeatState(NamedTuple):
     doubt: FloatArray = _EMPTY  #: (..., n_checks), start of one that cutting may explain; nan: none [s]
     gone: FloatArray = _EMPTY  #: (..., n_speeds), time at which a speed was first missing [s]
     back: FloatArray = _EMPTY  #: (..., n_speeds), time since which a failed speed agrees; nan: it does not [s]
-    fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watch.WORDS`
+    fault: IntArray = np.empty(0, dtype=np.int8)  #: (..., n_speeds), see `thermocomp.runtime.watchstate.WORDS`
 
 
 def begin(watch: Watch, runs: tuple[int, ...] = ()) -> HeatState:
@@ -120,7 +120,7 @@ def check(
     used : ndarray of shape (..., n_sensors)
         Temperatures minus their reference, with substitutes [degC].
     memory : ndarray of shape (..., n_memory)
-        See `thermocomp.runtime.watch.WatchState`.
+        See `thermocomp.runtime.watchstate.WatchState`.
     times : tuple of float
         Time, and time since the last check [s].
     failed : ndarray of bool of shape (..., n_sensors)

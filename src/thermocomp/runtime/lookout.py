@@ -7,7 +7,8 @@ import numpy as np
 
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.gate import Ranges, is_number
-from thermocomp.runtime.watch import WORDS, WatchState, is_quiet, look
+from thermocomp.runtime.watch import is_quiet, look
+from thermocomp.runtime.watchstate import WORDS, WatchState
 
 
 class Lookout:

@@ -13,7 +13,7 @@ from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.core.zero import ZeroMean
 from thermocomp.runtime.adaptation import Adaptation
 from thermocomp.runtime.feed import FeedState
-from thermocomp.runtime.watch import WatchState
+from thermocomp.runtime.watchstate import WatchState
 
 #: words of a service in place of ``active``, if no controller confirms the correction
 Unconfirmed = Literal["sent, not confirmed", "not confirmed", "not sent", "no sink"]

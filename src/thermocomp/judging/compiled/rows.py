@@ -1,7 +1,8 @@
 """Procedures that process all rows of a test, in the language of `thermocomp.runtime.program`."""
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import each, procedure
-from thermocomp.runtime.program.variables import Constants, Kept, TestRows, Work
+from thermocomp.runtime.program.variables import Kept, TestRows, Work
 from thermocomp.runtime.program.watching import believe
 
 

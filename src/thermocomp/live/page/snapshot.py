@@ -10,7 +10,7 @@ from thermocomp.live.loop import Service
 from thermocomp.live.settling import minutes_until
 from thermocomp.runtime.lines import DeviationLine
 from thermocomp.runtime.state import NO_ZERO, UNKNOWN
-from thermocomp.runtime.watch import UNSURE
+from thermocomp.runtime.watchstate import UNSURE
 
 #: states of a target, the one that needs attention most first
 ORDER = (

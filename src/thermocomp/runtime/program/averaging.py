@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, let, otherwise, otherwise_when, when
 from thermocomp.runtime.program.numbers import median
 from thermocomp.runtime.program.values import Condition, Number, Numbers, Whole
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 
 class Averaged(NamedTuple):

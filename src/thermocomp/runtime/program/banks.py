@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from thermocomp.core import expression as e
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, expm1, let, procedure
 from thermocomp.runtime.program.numbers import clip
 from thermocomp.runtime.program.values import Condition, Whole, integer
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 Lags = e.Lag | e.PacedLag
 

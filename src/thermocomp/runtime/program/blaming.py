@@ -1,11 +1,12 @@
 """Sensor failure that explains the residuals of readings, with scalars and loops: see `thermocomp.runtime.blame`."""
 
 from thermocomp.runtime.program import heating
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, let, procedure, when
 from thermocomp.runtime.program.numbers import follow, larger
 from thermocomp.runtime.program.values import Number, Whole, flag, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, STEPPED, STUCK, SWAPPED, UNEXPLAINED
+from thermocomp.runtime.program.variables import Kept, Work
+from thermocomp.runtime.watchstate import GOOD, STEPPED, STUCK, SWAPPED, UNEXPLAINED
 
 
 @procedure

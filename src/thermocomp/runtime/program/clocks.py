@@ -1,10 +1,11 @@
 """Values updated at fixed intervals, with scalars and loops only: see `thermocomp.core.expression.Recurrence`."""
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.formulas import tick
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, repeat_while, when
 from thermocomp.runtime.program.numbers import smaller
 from thermocomp.runtime.program.values import Condition, Whole, flag, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 MOST_TICKS = 2e9
 

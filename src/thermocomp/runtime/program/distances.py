@@ -1,9 +1,10 @@
 """Distance of inputs from the training data of a model, with scalars and loops only: see `thermocomp.core.joint`."""
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, floor, let, procedure, sqrt, when
 from thermocomp.runtime.program.numbers import larger, smaller
 from thermocomp.runtime.program.values import Whole, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 
 @procedure

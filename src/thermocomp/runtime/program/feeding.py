@@ -1,10 +1,11 @@
 """Repetition of all temperatures with scalars and loops only: see `thermocomp.runtime.feed` for explanations."""
 
 from thermocomp.runtime.feed import LARGEST, MOST_REPEATED, NONE
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, let, otherwise_when, procedure, when
 from thermocomp.runtime.program.values import Whole, flag, integer
-from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD
+from thermocomp.runtime.program.variables import Kept, Work
+from thermocomp.runtime.watchstate import GOOD
 
 STOPPED = 4
 

@@ -1,8 +1,9 @@
 """Outputs of the models: replaced by functions from the formulas of a compensator (`models.Formulas`)."""
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import procedure
 from thermocomp.runtime.program.values import Whole
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 
 @procedure

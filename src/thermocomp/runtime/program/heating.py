@@ -1,11 +1,12 @@
 """Supervision of the spindle speeds with scalars and loops only: see `thermocomp.runtime.heat` for explanations."""
 
 from thermocomp.runtime.heat import LEAD
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, each, function, let, procedure, raised, when
 from thermocomp.runtime.program.numbers import follow, larger, smaller
 from thermocomp.runtime.program.values import Number, flag, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, MISSING, OFF
+from thermocomp.runtime.program.variables import Kept, Work
+from thermocomp.runtime.watchstate import GOOD, MISSING, OFF
 
 
 @procedure

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.declarations import Var
 from thermocomp.runtime.program.tree import Kind
-from thermocomp.runtime.program.variables import RECORDS, Constants
+from thermocomp.runtime.program.variables import RECORDS
 
 IntArray = NDArray[np.int64]
 

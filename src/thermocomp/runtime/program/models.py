@@ -12,12 +12,13 @@ from thermocomp.core.model import ErrorModel
 from thermocomp.core.recurrences import Clock
 from thermocomp.runtime.program.banks import TableBank, join, stripped
 from thermocomp.runtime.program.clocks import run_clock
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import choose, exp, expm1, let, raised, record, when
 from thermocomp.runtime.program.numbers import clip, find_linear, find_step
 from thermocomp.runtime.program.supporting import Supports
 from thermocomp.runtime.program.tree import Expression, Function, Name
 from thermocomp.runtime.program.values import Condition, Number, Whole, integer, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 #: beyond every argument of a table
 _BEYOND = 1e30

@@ -1,5 +1,6 @@
 """Sorting, medians, lags and tables as scalars and loops."""
 
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import (
     choose,
     each,
@@ -15,7 +16,7 @@ from thermocomp.runtime.program.language import (
     when,
 )
 from thermocomp.runtime.program.values import Number, Whole, flag
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 
 @procedure

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 
 from thermocomp.core.starting import WARM, WARM_SHARE
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import each, let, otherwise_when, procedure, when
 from thermocomp.runtime.program.numbers import find_day
 from thermocomp.runtime.program.values import Number, Whole, flag, integer
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 CONTINUES, COLD, UNKNOWN = range(3)
 

@@ -10,6 +10,7 @@ from thermocomp.core.bounds import GAP
 from thermocomp.runtime.powerup import AT_ONCE
 from thermocomp.runtime.program import feeding, powering, watching
 from thermocomp.runtime.program.averaging import Averaged
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.formulas import models_absolute, models_rezeroed
 from thermocomp.runtime.program.language import (
     choose,
@@ -24,7 +25,7 @@ from thermocomp.runtime.program.language import (
 )
 from thermocomp.runtime.program.numbers import larger, smaller
 from thermocomp.runtime.program.values import Number, Whole
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 STARTS, ACTIVE, HOLDING, FADING, SHADOW, UNKNOWN = range(6)
 UNTIMELY, IMPLAUSIBLE, NO_START = 1, 2, 3

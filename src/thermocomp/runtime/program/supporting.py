@@ -8,11 +8,12 @@ from typing import Any
 from thermocomp.core.inputs import Input
 from thermocomp.core.joint import JointSupport
 from thermocomp.core.model import ErrorModel
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.distances import find_distances
 from thermocomp.runtime.program.language import let, when
 from thermocomp.runtime.program.numbers import larger
 from thermocomp.runtime.program.values import Number, integer, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
+from thermocomp.runtime.program.variables import Kept, Work
 
 
 class Supports:

@@ -15,10 +15,11 @@ from thermocomp.core.thresholds import THRESHOLDS, Thresholds
 from thermocomp.core.watch import Watch
 from thermocomp.runtime.compensator import Compensator
 from thermocomp.runtime.powerup import find_cold_after
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.labels import Labels, label_all
 from thermocomp.runtime.program.models import Formulas
 from thermocomp.runtime.program.tree import Function
-from thermocomp.runtime.program.variables import Constants, Kept
+from thermocomp.runtime.program.variables import Kept
 
 #: bound above any number, also in single precision
 ANY = (-1e30, 1e30)
@@ -39,7 +40,7 @@ class Tables(NamedTuple):
     sizes: dict[str, int]  #: array dimensions of the variables by name, and flags of optional features
     values: dict[
         str, Any
-    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.variables.Constants`
+    ]  #: numbers, or nested lists of them, by the names of `thermocomp.runtime.program.constants.Constants`
     formulas: dict[str, Function]  #: functions generated from the models' formulas
     labels: Labels  #: of the rows and columns of the values, by the name of their size
 

@@ -3,6 +3,7 @@
 from thermocomp.runtime.feed import NONE
 from thermocomp.runtime.program import blaming, heating
 from thermocomp.runtime.program.averaging import Averaged
+from thermocomp.runtime.program.constants import Constants
 from thermocomp.runtime.program.language import (
     choose,
     each,
@@ -16,8 +17,8 @@ from thermocomp.runtime.program.language import (
 )
 from thermocomp.runtime.program.numbers import find_day, follow, larger, smaller
 from thermocomp.runtime.program.values import Number, Whole, flag, integer, real
-from thermocomp.runtime.program.variables import Constants, Kept, Work
-from thermocomp.runtime.watch import GOOD, MISSING, OFF, UNEXPLAINED
+from thermocomp.runtime.program.variables import Kept, Work
+from thermocomp.runtime.watchstate import GOOD, MISSING, OFF, UNEXPLAINED
 
 HOLDING = 2
 
