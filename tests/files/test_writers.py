@@ -49,6 +49,7 @@ WRITING = {
     "recordings/readers/mending.py",
     "live/commands/serve.py",  # the configuration of its demo: a text, never over another
     "files/jsonfile.py",
+    "files/pdf.py",  # within a draft, as the pages
     "recordings/readers/recordings.py",
     "api/testprogram.py",
     "api/base.py",

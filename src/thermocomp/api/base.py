@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.files.draft import write_text
+from thermocomp.files.pdf import write_pdf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +50,9 @@ class Paged(ABC):
         """Return the page as a self-contained HTML text."""
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write the page; return its path."""
+        """Write the page as HTML, or as PDF if the name ends so; return its path."""
+        if Path(path).suffix.lower() == ".pdf":
+            return write_pdf(self.page(), Path(path), overwrite=overwrite)
         return write_text(self.page(), path, overwrite=overwrite)
 
 

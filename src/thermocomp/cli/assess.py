@@ -16,7 +16,7 @@ def assess(found: Assessed, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output report (.html), including failed sensors, their substitutes, and the loss of accuracy.
+        Output report (.html or .pdf), including failed sensors, their substitutes, and the loss of accuracy.
 
     Returns
     -------

@@ -17,7 +17,7 @@ def check(found: CheckedRecordings, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output page (.html): a plot of every channel, with the findings marked at their rows.
+        Output page (.html or .pdf): a plot of every channel, with the findings marked at their rows.
 
     Returns
     -------

@@ -15,7 +15,7 @@ def compare(found: Compared, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output report (.html).
+        Output report (.html or .pdf).
 
     Returns
     -------

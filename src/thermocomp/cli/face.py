@@ -25,6 +25,7 @@ from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
 from thermocomp.core.plugins import find_plugins
+from thermocomp.files.pdf import find_browser
 from thermocomp.report.answer import CommandAnswer
 
 #: types of parameters on the command line, where Python accepts more types than a command line can express; a group of
@@ -48,6 +49,8 @@ OTHERS = 6
 SHOWN = ("progress",)
 #: function that returns the files written for an output and given options
 Writes = Callable[[Path, Mapping[str, Any]], list[Path]]
+#: a page can be printed, too
+PAGES = (".html", ".pdf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +92,10 @@ class CommandFace:
         if self.output is not None:
             files = [self.output] if isinstance(writes, str) else writes(self.output, given)
             inputs = [v for v in _flat(given.values()) if isinstance(v, Path)]
-            refuse_existing(files, self.overwrite, inputs, writes if isinstance(writes, str) else "")
+            endings = () if callable(writes) else PAGES if writes == ".html" else (writes,)
+            refuse_existing(files, self.overwrite, inputs, *endings)
+            if endings == PAGES and self.output.suffix.lower() == ".pdf":
+                find_browser()
 
     def write(self, writer: Callable[..., object]) -> None:
         """Write the result to the output file, if one is given."""
@@ -260,8 +266,8 @@ def command(
     place : str
         Location of the verb, such as ``thermocomp.api.verbs:compare``.
     writes : str or callable
-        Extension of the file named by ``--output``, or a function that returns all files written for it and for the
-        options given. Default: the command has no ``--output``.
+        Extension of the file named by ``--output`` (``.html`` permits ``.pdf``), or a function that returns all files
+        written for it and for the options given. Default: the command has no ``--output``.
     needs_output : bool
         Whether ``--output`` is required.
     forms : mapping

@@ -27,7 +27,7 @@ def select(found: Selected, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output page with tables and figures (.html).
+        Output page with tables and figures (.html or .pdf).
 
     Returns
     -------

@@ -12,7 +12,7 @@ OTHERWISE = "choose another name or allow overwriting with --overwrite"
 _NOT_ALLOWED = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 
-def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), ending: str = "") -> None:
+def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Path] = (), *endings: str) -> None:
     """Raise `InputError` if an output cannot be written, before any work is done."""
     for path in paths:
         place = find_place(path)
@@ -20,9 +20,10 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
             raise InputError(f"{path}: this file is also an input; choose another name")
         if place.exists() and not overwrite:
             raise InputError(f"{path}: the file exists already; {OTHERWISE}")
-        if ending and path.suffix.lower() != ending:
+        if endings and path.suffix.lower() not in endings:
             raise InputError(
-                f"{path}: the file is written in the format {ending[1:]}; name it {path.with_suffix(ending)}"
+                f"{path}: the file is written in the format {' or '.join(e[1:] for e in endings)}; name it "
+                f"{path.with_suffix(endings[0])}"
             )
 
 

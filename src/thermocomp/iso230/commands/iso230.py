@@ -52,7 +52,7 @@ def iso230(found: Evaluated, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output page with tables and figures (.html).
+        Output page with tables and figures (.html or .pdf).
 
     Returns
     -------

@@ -25,7 +25,7 @@ def volumetric(found: VolumetricErrors, face: CommandFace) -> int:
     Parameters
     ----------
     output : Path
-        Output page with figures and tables (.html).
+        Output page with figures and tables (.html or .pdf).
 
     Returns
     -------
