@@ -137,9 +137,9 @@ class ProjectRun:
             if self.settings.assess:
                 self._step("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
             if self.settings.select is not None:
-                self._step("select", self._select, self.project.key_of(("select",), ()))
+                self._renew("select", self._select, self.project.key_of(("select",), ()))
             if self.settings.plan is not None:
-                self._step("plan", self._plan, self.project.key_of(("plan",), ()))
+                self._renew("plan", self._plan, self.project.key_of(("plan",), ()))
 
     def _learn(self) -> None:
         tests = self._recordings()
@@ -199,10 +199,13 @@ class ProjectRun:
         assert options is not None
         own = self._common() | given(options, ("dialect", "probe_every"))
         found = plan(self._recordings(), progress=self._progress(), **own)
-        program = self.folder.path / self._free("next-test.ngc" if options.dialect == "linuxcnc" else "next-test.nc")
+        folder = self.folder.path / self._free("plan")
+        folder.mkdir()
+        program = folder / ("next-test.ngc" if options.dialect == "linuxcnc" else "next-test.nc")
         written = found.write(program, dialect=options.dialect, every=options.probe_every)
         files, text = self._write(found)
-        return [program.name, written.name, program.with_suffix(".png").name, *files], text
+        names = [path.name for path in (program, written, program.with_suffix(".png"))]
+        return [*(f"{folder.name}/{name}" for name in names), *files], text
 
     def _common(self) -> dict[str, Any]:
         """Return the keywords that other commands take from the table ``[compare]``."""
@@ -244,6 +247,12 @@ class ProjectRun:
 
     def _has(self, name: str, key: str = "") -> bool:
         return any((s.name, s.key) == (name, key) for s in self.folder.state.steps)
+
+    def _renew(self, name: str, work: Callable[[], tuple[list[str], str]], key: str) -> None:
+        """Execute a step unless its last result is of the same settings; the run lists only this one."""
+        if not self._has(name, key):
+            self._forget(name)
+            self._step(name, work, key)
 
     def _forget(self, name: str) -> None:
         self.folder.state.steps = [s for s in self.folder.state.steps if s.name != name]

@@ -8,6 +8,7 @@ from fastapi import Path as InPath
 from starlette.exceptions import HTTPException
 
 from thermocomp.app.comparing import compare_runs, read_json
+from thermocomp.app.livetrial import LiveTrial
 from thermocomp.app.runfolder import RunFolder, runs_of
 from thermocomp.app.store import NAME, Store
 from thermocomp.core.exceptions import InputError
@@ -19,7 +20,21 @@ RunNumber = Annotated[int, InPath(ge=1, le=10**9)]
 
 def view_runs(store: Store) -> APIRouter:
     """Return the routes; those that read large files are answered in threads."""
-    router = APIRouter()
+    router, trial = APIRouter(), LiveTrial()
+
+    @router.get("/api/live")
+    async def told() -> Json:
+        return Json(trial.tell())
+
+    @router.post("/api/live/{number}")
+    async def start(number: RunNumber) -> Json:
+        await trial.start(run_of(store.folder, number))
+        return Json(trial.tell())
+
+    @router.delete("/api/live")
+    async def stop() -> Json:
+        await trial.stop()
+        return Json(trial.tell())
 
     @router.get("/api/runs/{number}/curves")
     def curves(number: RunNumber, target: str, model: str) -> Json:

@@ -229,8 +229,10 @@ $("settings").addEventListener("submit", startRun);
 $("target").addEventListener("submit", exportModels);
 $("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs[state.runs.length - 1].number}`, "DELETE")));
 $("name").addEventListener("change", quietly(e => api("api/settings", "PUT", { name: e.target.value })));
-api("api/project").then(render).catch(() => 0);
-const events = new EventSource("api/events");
-events.addEventListener("message", e => render(JSON.parse(e.data)));
-events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
-events.addEventListener("open", () => alarm());
+addEventListener("DOMContentLoaded", () => {  // when the other scripts listen
+  api("api/project").then(render).catch(() => 0);
+  const events = new EventSource("api/events");
+  events.addEventListener("message", e => render(JSON.parse(e.data)));
+  events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
+  events.addEventListener("open", () => alarm());
+});
