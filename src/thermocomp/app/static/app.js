@@ -73,7 +73,8 @@ function draw(name) {  // the card of a recording
   if (found.mapping) card.append(element("details", "", "", element("summary", "Mapping: what was changed in reading this file"), element("pre", found.mapping)), undoing);
   const figure = element("figure"), script = element("script", JSON.stringify(found.panels));
   script.type = "application/json"; figure.append(script); card.append(figure);
-  if (found.panels.length) show(figure, figures++);
+  const plots = found.panels.length ? show(figure, figures++) : [];
+  document.dispatchEvent(new CustomEvent("card", { detail: { name, found, card, figure, plots } }));
   judgeForm();
 }
 
