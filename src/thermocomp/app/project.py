@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from thermocomp import __version__
 from thermocomp.api.plan import EVERY, plan
@@ -25,6 +25,8 @@ from thermocomp.files.tomlfile import as_json, read_toml
 #: parameters that a project gives elsewhere, and those that other commands take from the table ``[compare]``
 _ELSEWHERE = ("recordings", "mapping", "starts", "limits", "scheduler", "progress")
 COMMON = ("targets", "inputs", "split", "leave_one", "absolute", "zero_over", "jobs")
+#: part of a whole
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +90,21 @@ class ExportOptions(ReductionOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
+class MachineSketch:
+    """Table ``[sketch]``: where the sensors are, on a sketch of the machine; results do not depend on it.
+
+    Parameters
+    ----------
+    machine : {'mill', 'lathe', 'five-axis', 'printer'}
+    places : mapping of str to tuple of float
+        Place of each sensor, from the left and from the top, as fractions of the sketch.
+    """
+
+    machine: Literal["mill", "lathe", "five-axis", "printer"] = "mill"
+    places: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
 class SelectOptions(SelectionSettings):
     """Table ``[select]``: see `thermocomp.select`.
 
@@ -130,6 +147,8 @@ class ProjectSettings:
         Default: sensors are not selected.
     plan : PlanOptions, optional
         Keywords of `thermocomp.plan`, and of its NC program. Default: no test is planned.
+    sketch : MachineSketch, optional
+        Places of the sensors.
     export : ExportOptions, optional
         Default: nothing is exported.
     assess : tuple of ProjectRecording
@@ -144,6 +163,7 @@ class ProjectSettings:
     fit: FitOptions = FitOptions()
     select: SelectOptions | None = None
     plan: PlanOptions | None = None
+    sketch: MachineSketch | None = None
     export: ExportOptions | None = None
     assess: tuple[ProjectRecording, ...] = ()
 
