@@ -7,6 +7,8 @@ from typing import Any
 import httpx
 import pytest
 from apppages import TOKEN, WHOLE, asked_of, copy_of, finished, opened
+from projects import small_project
+from smallmachine import small_machine
 
 import thermocomp as tc
 from thermocomp.api.keywords import silent
@@ -58,7 +60,7 @@ def test_evidence_in_a_browser(finished_project: Path) -> None:
 
 
 def test_two_runs_side_by_side(finished_project: Path, tmp_path: Path) -> None:
-    folder, script = copy_of(finished_project, tmp_path / "mine"), "<img src=x onerror=alert(1)>"
+    folder, script = copy_of(finished_project, tmp_path / "mine"), "<img/src=x/onerror=alert(1)>"
     text = WHOLE.replace('models = ["ols", "averaged"]', 'models = ["ols", "ridge"]').replace("Small machine", script)
     (folder / "project.toml").write_text(text, encoding="utf-8")
     run_project(Project(folder), silent)
@@ -113,3 +115,34 @@ def test_other_folders_are_refused(finished_project: Path, project: str) -> None
             assert (await client.get(f"/{TOKEN}/api/{path}")).status_code == 422
 
     asked_of(finished_project, work)
+
+
+def test_names_that_are_scripts_never_run(tmp_path: Path) -> None:
+    """Channels, cycles and the project are named by scripts; every step of the page shows them as text."""
+    folder, script = tmp_path / "project", "<img/src=x/onerror=alert(1)>"
+    text = WHOLE.replace("z_um", f"{script}z_um").replace("Small machine", script)
+    small_project(folder, text)
+    table = small_machine().to_frame()
+    table.columns = [c if c in ("time_s", "spindle_rpm") else f"{script}{c}" for c in table.columns]
+    table["cycle"] = [f"{script}{k // 200}" for k in range(len(table))]
+    table.to_csv(folder / "files" / "drift.csv", index=False)
+    run_project(Project(folder), silent)
+    with opened(folder, width=1200, dark=False) as page:
+        page.wait_for_selector("#sketch:not([hidden])", timeout=120_000)
+        for summary in ("#sketch summary", "details.cycles summary"):
+            page.locator(summary).press("Enter")
+        assert page.locator("#sketch g").first.get_attribute("aria-label") == f"{script}t1_C, not placed"
+        page.locator("#tab-judge").press("Enter")
+        page.locator("#details button", has_text="curves").first.press("Enter")
+        page.wait_for_selector("#curves canvas")
+        page.locator("#curves .zoom button", has_text=script).first.press("Enter")
+        page.locator("#details circle").first.press("Enter")
+        assert script in page.locator("#details .charts [role=status]").first.inner_text()
+        page.select_option("#run-b", "1")
+        page.locator("#beside button").press("Enter")
+        page.wait_for_selector("#compared table")
+        page.locator("#tab-plan").press("Enter")
+        page.wait_for_selector("#planned table")
+        page.locator("#tab-deploy").press("Enter")
+        assert page.locator("img").count() == 0
+    assert json.dumps(f"{script}t1_C") in (folder / "runs" / "1" / "live.toml").read_text(encoding="utf-8")

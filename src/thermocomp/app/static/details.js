@@ -60,7 +60,10 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
 
   function sensors(results) {
     const own = overall(results.compare).filter(r => r.rms_um != null), chosen = ((results.sensors || {}).choices || []), box = element("div", "", "charts");
-    for (const c of chosen) if (c.points.length) box.append(scatter(`Smallest sets of temperatures: ${c.target}`, "temperature sensors", c.unit, c.points.filter(p => p.error != null)));
+    for (const c of chosen) {
+      const points = c.points.filter(p => p.error != null);
+      if (points.length) box.append(scatter(`Smallest sets of temperatures: ${c.target}`, "temperature sensors", c.unit, points));
+    }
     for (const target of new Set(own.map(r => r.target))) box.append(scatter(`Methods compared, all inputs: ${target}`, "inputs", "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, error: r.rms_um }))));
     const ask = button("Find the smallest sufficient set of sensors", quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
     return [element("h3", "Number of sensors against error on unseen data"), ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
