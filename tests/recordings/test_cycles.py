@@ -1,12 +1,16 @@
 """Thermal cycles from the spindle speed, or given."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from thermocomp.core.exceptions import RecordingError
-from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_at, split_by_labels
+from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.readers.recordings import read
 
 
 @given(
@@ -80,3 +84,28 @@ def test_labels_become_cycles() -> None:
 def test_the_whole_test_is_one_cycle() -> None:
     assert make_single_cycle(7) == (Cycle("whole test", 0, 7),)
     assert len(make_single_cycle(7)[0]) == 7
+
+
+def test_cycles_begin_where_the_user_says() -> None:
+    time = np.arange(0.0, 600.0, 60.0)
+    speed = np.r_[0.0, 1000.0, 1000.0, 0.0, 0.0, 2000.0, 2000.0, 0.0, np.nan, 0.0]
+
+    assert split_at(time, [240.0], speed) == (Cycle("1 (1000 1/min)", 0, 4), Cycle("2 (2000 1/min)", 4, 10))
+    assert split_at(time, [210.0, 540.0]) == (Cycle("1", 0, 4), Cycle("2", 4, 9), Cycle("3", 9, 10))
+    for starts, empty in (([0.0], 1), ([600.0], 2), ([240.0, 240.0], 2), ([480.0, 240.0], 2), ([-60.0], 1)):
+        with pytest.raises(RecordingError, match=f"cycle {empty} would have no rows"):
+            split_at(time, starts, speed)
+
+
+def test_cycles_of_a_mapping(tmp_path: Path) -> None:
+    """Seconds since the first row of the file, whatever is cut, or time stamps; labels of the file do not matter."""
+    rows = "".join(f"2024-05-06 08:{k:02d}:00,{20 + k},{k},{k // 5}\n" for k in range(20))
+    (tmp_path / "a.csv").write_text(f"timestamp,t1 [degC],z [um],cycle\n{rows}", encoding="utf-8")
+    cut = '[[clean]]\ndo = "cut"\ntimes = [[0, 120]]\n'
+    for starts in ("[600]", '["2024-05-06T08:10:00"]'):
+        (tmp_path / "m.toml").write_text(f"[cycles]\nstarts = {starts}\n{cut}", encoding="utf-8")
+        found = read(tmp_path / "a.csv", read_mapping(tmp_path / "m.toml"))
+        assert [(c.start, c.stop) for c in found.cycles] == [(0, 7), (7, 17)]
+    (tmp_path / "m.toml").write_text(f"[cycles]\nstarts = [60]\n{cut}", encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"a\.csv: thermal cycle 1 would have no rows"):
+        read(tmp_path / "a.csv", read_mapping(tmp_path / "m.toml"))

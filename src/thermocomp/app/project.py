@@ -1,16 +1,19 @@
 """Projects: a folder with ``project.toml``, its recordings and mappings, and the results of each run."""
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, make_dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from thermocomp import __version__
+from thermocomp.api.plan import EVERY, plan
+from thermocomp.api.select import SelectionMethod, SelectionSettings
+from thermocomp.api.testprogram import Dialect
 from thermocomp.api.verbs import compare
 from thermocomp.app.store import NAME, find_inside
 from thermocomp.core.correction import Limits
@@ -19,8 +22,11 @@ from thermocomp.export.reduction.options import ReductionOptions
 from thermocomp.files.plaintext import find_keys, list_errors, strict_adapter
 from thermocomp.files.tomlfile import as_json, read_toml
 
-#: parameters of `compare` that a project gives elsewhere
+#: parameters that a project gives elsewhere, and those that other commands take from the table ``[compare]``
 _ELSEWHERE = ("recordings", "mapping", "starts", "limits", "scheduler", "progress")
+COMMON = ("targets", "inputs", "split", "leave_one", "absolute", "zero_over", "jobs")
+#: part of a whole
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,14 +89,44 @@ class ExportOptions(ReductionOptions):
     dialect: str = ""
 
 
-def _compare_options() -> type:
-    """Return the type of the table ``[compare]``: the keywords of `thermocomp.compare`, with their types."""
-    parameters = inspect.signature(compare).parameters
-    taken = [(n, p.annotation, field(default=p.default)) for n, p in parameters.items() if n not in _ELSEWHERE]
-    return make_dataclass("CompareOptions", taken, frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
+class MachineSketch:
+    """Table ``[sketch]``: where the sensors are, on a sketch of the machine; results do not depend on it.
+
+    Parameters
+    ----------
+    machine : {'mill', 'lathe', 'five-axis', 'printer'}
+    places : mapping of str to tuple of float
+        Place of each sensor, from the left and from the top, as fractions of the sketch.
+    """
+
+    machine: Literal["mill", "lathe", "five-axis", "printer"] = "mill"
+    places: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
 
 
-CompareOptions: Any = _compare_options()
+@dataclass(frozen=True, kw_only=True)
+class SelectOptions(SelectionSettings):
+    """Table ``[select]``: see `thermocomp.select`.
+
+    Parameters
+    ----------
+    method : str
+        Selection method.
+    """
+
+    method: SelectionMethod = "pareto"
+
+
+def _options_of(verb: Callable[..., object], leave: Collection[str], **more: tuple[Any, Any]) -> type:
+    """Return the type of a table: the keywords of a command without some, and `more`, with their defaults."""
+    parameters = inspect.signature(verb).parameters
+    taken = {n: (p.annotation, p.default) for n, p in parameters.items() if n not in leave} | more
+    types = [(n, kind, field(default=default)) for n, (kind, default) in taken.items()]
+    return make_dataclass(f"{verb.__name__.title()}Options", types, frozen=True, kw_only=True)
+
+
+CompareOptions: Any = _options_of(compare, _ELSEWHERE)
+PlanOptions: Any = _options_of(plan, {*_ELSEWHERE, *COMMON}, dialect=(Dialect, "linuxcnc"), probe_every=(float, EVERY))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +143,12 @@ class ProjectSettings:
         Keywords of `thermocomp.compare`.
     limits : Limits
         Limits of the corrections, applied while the models are judged, and of the exported code.
+    select : SelectOptions, optional
+        Default: sensors are not selected.
+    plan : PlanOptions, optional
+        Keywords of `thermocomp.plan`, and of its NC program. Default: no test is planned.
+    sketch : MachineSketch, optional
+        Places of the sensors.
     export : ExportOptions, optional
         Default: nothing is exported.
     assess : tuple of ProjectRecording
@@ -119,6 +161,9 @@ class ProjectSettings:
     compare: CompareOptions = field(default_factory=CompareOptions)
     limits: Limits = Limits()
     fit: FitOptions = FitOptions()
+    select: SelectOptions | None = None
+    plan: PlanOptions | None = None
+    sketch: MachineSketch | None = None
     export: ExportOptions | None = None
     assess: tuple[ProjectRecording, ...] = ()
 

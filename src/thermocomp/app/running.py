@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,12 @@ from thermocomp import __version__
 from thermocomp.api.check import check
 from thermocomp.api.inputs import read
 from thermocomp.api.join import join
+from thermocomp.api.plan import plan
 from thermocomp.api.results import Compared, FittedModels
+from thermocomp.api.select import select
 from thermocomp.api.verbs import assess, compare
-from thermocomp.app.project import Project, ProjectRecording, given
+from thermocomp.app.evidence import curves_of, live_configuration, points_of
+from thermocomp.app.project import COMMON, Project, ProjectRecording, given
 from thermocomp.app.runfolder import RunFolder, RunStep, new_run, runs_of
 from thermocomp.app.store import NAME
 from thermocomp.cli.answers import free
@@ -132,6 +136,10 @@ class ProjectRun:
                 self._step("export", self._export, self.project.key_of(("export", "limits"), ()))
             if self.settings.assess:
                 self._step("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
+            if self.settings.select is not None:
+                self._renew("select", self._select, self.project.key_of(("select",), ()))
+            if self.settings.plan is not None:
+                self._renew("plan", self._plan, self.project.key_of(("plan",), ()))
 
     def _learn(self) -> None:
         tests = self._recordings()
@@ -164,7 +172,9 @@ class ProjectRun:
     def _compare(self, tests: list[Recording]) -> tuple[list[str], str]:
         options = given(self.settings.compare)
         self.compared = found = compare(tests, limits=self.settings.limits, progress=self._progress(), **options)
-        files = self._write(found, (found.report, "comparison.html"))
+        files = self._write(
+            found, (found.report, "comparison.html"), (partial(write_text, curves_of(found)), "curves.json")
+        )
         if found.comparison.left:
             raise KeyboardInterrupt
         return files
@@ -175,7 +185,35 @@ class ProjectRun:
             raise InputError(f"{self.project.file}: a recording or mapping was changed during the run; start it again")
         fit = self.settings.fit
         self.fitted = found = self.compared.fit(dict(fit.model), accept_unproven=fit.accept_unproven or None)
-        return self._write(found, (found.save, "model.json"))
+        live = live_configuration(found.fitted.models, self.settings.limits)
+        return self._write(found, (found.save, "model.json"), (partial(write_text, live), "live.toml"))
+
+    def _select(self) -> tuple[list[str], str]:
+        options = self._common() | given(self.settings.select)
+        found = select(self._recordings(), progress=self._progress(), **options)
+        points = partial(write_text, points_of(found))
+        return self._write(found, (found.report, self._free("sensors.html")), (points, "sensors.json"))
+
+    def _plan(self) -> tuple[list[str], str]:
+        options = self.settings.plan
+        assert options is not None
+        own = self._common() | given(options, ("dialect", "probe_every"))
+        found = plan(self._recordings(), progress=self._progress(), **own)
+        folder = self.folder.path / self._free("plan")
+        folder.mkdir()
+        program = folder / ("next-test.ngc" if options.dialect == "linuxcnc" else "next-test.nc")
+        written = found.write(program, dialect=options.dialect, every=options.probe_every)
+        files, text = self._write(found)
+        names = [path.name for path in (program, written, program.with_suffix(".png"))]
+        return [*(f"{folder.name}/{name}" for name in names), *files], text
+
+    def _common(self) -> dict[str, Any]:
+        """Return the keywords that other commands take from the table ``[compare]``."""
+        return {name: getattr(self.settings.compare, name) for name in COMMON}
+
+    def _free(self, name: str) -> str:
+        """Return a name that no file of the run has yet."""
+        return free(str(self.folder.path / name)).name
 
     def _export(self) -> tuple[list[str], str]:
         options = self.settings.export
@@ -190,7 +228,7 @@ class ProjectRun:
     def _assess(self) -> tuple[list[str], str]:
         tests = self._read(self.settings.assess)
         found = assess(self._model, tests, limits=self.settings.limits, progress=self._progress())
-        return self._write(found, (found.report, free(str(self.folder.path / "assessment.html")).name))
+        return self._write(found, (found.report, self._free("assessment.html")))
 
     @property
     def _model(self) -> Path:
@@ -209,6 +247,12 @@ class ProjectRun:
 
     def _has(self, name: str, key: str = "") -> bool:
         return any((s.name, s.key) == (name, key) for s in self.folder.state.steps)
+
+    def _renew(self, name: str, work: Callable[[], tuple[list[str], str]], key: str) -> None:
+        """Execute a step unless its last result is of the same settings; the run lists only this one."""
+        if not self._has(name, key):
+            self._forget(name)
+            self._step(name, work, key)
 
     def _forget(self, name: str) -> None:
         self.folder.state.steps = [s for s in self.folder.state.steps if s.name != name]

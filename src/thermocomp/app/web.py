@@ -17,7 +17,9 @@ from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
-from thermocomp.app.runfolder import RunFolder, runs_of
+from thermocomp.app.comparing import read_json as _json
+from thermocomp.app.runfolder import runs_of
+from thermocomp.app.runviews import run_of, view_runs
 from thermocomp.app.store import LARGEST, Store, find_inside, start_run
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.page.doors import Door, Json
@@ -48,6 +50,7 @@ def make_app(store: Store, token: str = "") -> FastAPI:
     app.mount(f"/{token}/static", static)
     app.include_router(_files(store), prefix=f"/{token}")
     app.include_router(_results(store), prefix=f"/{token}")
+    app.include_router(view_runs(store), prefix=f"/{token}")
 
     @app.exception_handler(HTTPException)
     async def refuse(_: Request, error: HTTPException) -> Json:
@@ -136,18 +139,19 @@ def _results(store: Store) -> APIRouter:
 
     @router.delete("/api/runs/{number}")
     async def stop(number: Annotated[int, InPath(ge=1, le=10**9)]) -> Json:
-        _run(store, number).ask_to_stop()
+        run_of(store.folder, number).ask_to_stop()
         return Json({"asked": True})
 
     @router.get("/api/runs/{number}")
     async def result(number: Annotated[int, InPath(ge=1, le=10**9)]) -> Json:
-        folder = _run(store, number)
-        found = {n: _json(folder.path / f"{n}.json") for n in ("check", "compare", "fit", "assess")}
+        folder = run_of(store.folder, number)
+        names = ("check", "compare", "fit", "assess", "sensors", "plan")
+        found = {n: _json(folder.path / f"{n}.json") for n in names}
         return Json({**folder.read(), "results": found})
 
     @router.get("/runs/{number}/{name:path}")
     async def file(number: Annotated[int, InPath(ge=1, le=10**9)], name: str) -> FileResponse:
-        folder = _run(store, number).path
+        folder = run_of(store.folder, number).path
         if not name or not (path := find_inside(folder, name)).is_file():
             raise HTTPException(404, f"run {number} has no file {name}")
         kind = mimetypes.guess_type(path.name)[0] or "text/plain"
@@ -180,20 +184,6 @@ def _state(store: Store) -> dict[str, Any]:
         run.pop("seen", None)
     command = f"thermocomp run {store.folder}"
     return {"folder": str(store.folder), "settings": store.content(), "runs": runs, "command": command}
-
-
-def _run(store: Store, number: int) -> RunFolder:
-    for run in runs_of(store.folder):
-        if run.number == number:
-            return run
-    raise HTTPException(404, f"there is no run {number}")
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
 
 
 def _encodable(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:

@@ -11,6 +11,10 @@ from thermocomp.core.exceptions import RecordingError
 
 #: shorter runs and stops of the spindle do not split a test [s]
 SPLITS = 300.0
+#: the spindle runs above this fraction of its top speed
+_TURNING = 0.02
+#: times closer than this are equal [s]
+SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -50,30 +54,62 @@ def find_cycles(
     min_run, min_stop : float
         Shorter runs and stops (a tool change, a lost reading) do not split the test [s].
     """
-    known = np.isfinite(speed)
-    if not known.any():
-        return make_single_cycle(len(time))
-    last_known = np.maximum.accumulate(np.where(known, np.arange(len(speed)), 0))
-    filled = np.abs(np.nan_to_num(speed[last_known]))
-    top = filled.max()
+    filled = _fill(speed)
+    top = filled.max(initial=0.0)
     if top == 0:
         return make_single_cycle(len(time))
-    turning = filled > 0.02 * top
+    turning = filled > _TURNING * top
     turning = _drop_short(time, turning, state=False, shorter_than=min_stop)
     turning = _drop_short(time, turning, state=True, shorter_than=min_run)
     starts = [int(k) + 1 for k in np.flatnonzero(~turning[:-1] & turning[1:])]
     if turning[0] or not starts:
         starts.insert(0, 0)
     starts[0] = 0
-    stops = [*starts[1:], len(time)]
-    cycles = []
-    for number, (a, b) in enumerate(zip(starts, stops, strict=True), start=1):
-        running = filled[a:b][turning[a:b]]
+    return _name(starts, filled, turning)
+
+
+def split_at(time: FloatArray, starts: Sequence[float], speed: FloatArray | None = None) -> tuple[Cycle, ...]:
+    """Split a test at times stated by the user.
+
+    Parameters
+    ----------
+    time : ndarray of shape (n_rows,)
+        [s]
+    starts : sequence of float
+        Start of every thermal cycle but the first, in increasing order [s].
+    speed : ndarray of shape (n_rows,), optional
+        Spindle speed, for the names of the cycles [1/min].
+
+    Raises
+    ------
+    RecordingError
+        A cycle would have no rows.
+    """
+    rows = [0, *np.searchsorted(time, np.asarray(starts) - SAME).tolist(), len(time)]
+    for k, (a, b) in enumerate(pairwise(rows)):
+        if b <= a:
+            raise RecordingError(f"thermal cycle {k + 1} would have no rows: its start or the next one must be moved")
+    filled = _fill(np.zeros(len(time)) if speed is None else speed)
+    return _name(rows[:-1], filled, filled > _TURNING * filled.max())
+
+
+def _fill(speed: FloatArray) -> FloatArray:
+    """Return the magnitude of the last known speed; 0 before the first one."""
+    known = np.isfinite(speed)
+    last_known = np.maximum.accumulate(np.where(known, np.arange(len(speed)), 0))
+    return np.abs(np.nan_to_num(speed[last_known]))
+
+
+def _name(starts: Sequence[int], speed: FloatArray, turning: BoolArray) -> tuple[Cycle, ...]:
+    """Return the cycles that begin at these rows, named by their number and the speeds of the running spindle."""
+    cycles, top = [], speed.max()
+    for number, (a, b) in enumerate(pairwise([*starts, len(speed)]), start=1):
+        running = speed[a:b][turning[a:b]]
         speeds = np.unique(np.round(running)) if running.size else np.array([0.0])
         # a measured speed fluctuates: more than a few values are reported as a range
         steady = running.size and np.ptp(running) <= 0.05 * top
         text = f"{np.median(running):.0f}" if steady else f"{speeds.min():.0f}-{speeds.max():.0f}"
-        cycles.append(Cycle(f"{number} ({text} 1/min)", a, b))
+        cycles.append(Cycle(f"{number} ({text} 1/min)" if top else f"{number}", a, b))
     return tuple(cycles)
 
 

@@ -42,6 +42,8 @@ class Rows:
         Cells of further requested columns that exist.
     min_run, min_stop : float
         Shorter runs and stops of the spindle do not split the test into thermal cycles [s].
+    starts : tuple of Instant
+        Times at which thermal cycles begin, except for the first; empty: as labels or speed say.
     most_cycles : int
         Maximum number of thermal cycles.
     aliases : mapping of str to str
@@ -71,6 +73,7 @@ class Rows:
     extra: dict[str, list[Any]] = field(default_factory=dict)
     min_run: float = 300.0
     min_stop: float = 300.0
+    starts: tuple[Instant, ...] = ()
     most_cycles: int = 10_000
     aliases: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

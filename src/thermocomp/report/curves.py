@@ -78,7 +78,7 @@ def measured(recording: Recording, points: int) -> list[dict[str, Any]]:
     return [channels(recording, shown, points) for shown in each if shown]
 
 
-def run(shown: Assessment, recordings: Sequence[Recording]) -> list[dict[str, Any]]:
+def run(shown: Assessment, recordings: Sequence[Recording], points: int = RUN) -> list[dict[str, Any]]:
     """Return the panel of a model over its judged rows: measured, predicted, residual; thermal cycles shaded."""
     hours = clock(shown, [r.time for r in recordings])
     curves = [
@@ -101,7 +101,7 @@ def run(shown: Assessment, recordings: Sequence[Recording]) -> list[dict[str, An
         cycles.append((float(hours[first]), float(hours[last]), name, told))
     thinned = []
     for name, values, tone in curves:
-        x, y = thin_points(hours, values, RUN)
+        x, y = thin_points(hours, values, points)
         thinned.append(PageCurve(name=name, hours=x, values=y, tone=tone, dash=int(name == "predicted")))
     return [_panel(f"{shown.target.removesuffix('_um')} [um]", thinned, cycles)]
 

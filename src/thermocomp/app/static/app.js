@@ -73,7 +73,8 @@ function draw(name) {  // the card of a recording
   if (found.mapping) card.append(element("details", "", "", element("summary", "Mapping: what was changed in reading this file"), element("pre", found.mapping)), undoing);
   const figure = element("figure"), script = element("script", JSON.stringify(found.panels));
   script.type = "application/json"; figure.append(script); card.append(figure);
-  if (found.panels.length) show(figure, figures++);
+  const plots = found.panels.length ? show(figure, figures++) : [];
+  document.dispatchEvent(new CustomEvent("card", { detail: { name, found, card, figure, plots } }));
   judgeForm();
 }
 
@@ -157,9 +158,9 @@ function progress(run) {
 
 const um = v => v == null ? "–" : v.toFixed(2);
 const verdict = quietly(async run => {
-  if (!run || run.state !== "done" || shownRun === run.number + run.ended) return;
+  if (!run || shownRun === run.number + run.ended) return;
   shownRun = run.number + run.ended;
-  const { compare, fit } = (await api(`api/runs/${run.number}`)).results, models = (fit || {}).models || [];
+  const shown = (await api(`api/runs/${run.number}`)).results, { compare, fit } = shown, models = (fit || {}).models || [];
   const head = ["deviation", "method", "verdict", "RMS with compensation [um]", "RMS without [um]", "why"];
   const method = target => [...((compare || {}).recommended || []).map(r => ({ ...r, model: r.written })), ...((compare || {}).results || [])].find(r => r.target === target && r.model);
   const line = m => [m.target, (method(m.target) || { model: m.family }).model, m.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason];
@@ -168,6 +169,7 @@ const verdict = quietly(async run => {
     scrolling(element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
     element("p", "", "", link(run, "comparison.html", "All methods, with curves and reasons"), " · ", link(run, "check.html", "Check of the data"), " · ", link(run, "model.json", "Model file")));
   deployForm(run);
+  document.dispatchEvent(new CustomEvent("result", { detail: { run, results: shown } }));
 });
 function link(run, name, text) { const a = element("a", text); a.href = `runs/${run.number}/${name.split("/").map(encodeURIComponent).join("/")}`; a.target = "_blank"; return a; }
 
@@ -203,7 +205,8 @@ function render(found) {
   if (document.activeElement !== $("name")) $("name").value = state.settings.name || "";
   const last = state.runs[state.runs.length - 1];
   files(); judgeForm(); progress(last); runsTable(state.runs);
-  verdict([...state.runs].reverse().find(r => r.state === "done"));
+  verdict([...state.runs].reverse().find(r => r.state !== "running" && r.steps.some(s => s.name === "fit")));  // a later step may have failed
+  document.dispatchEvent(new CustomEvent("state"));
 }
 
 function open(tab) {
@@ -227,8 +230,10 @@ $("settings").addEventListener("submit", startRun);
 $("target").addEventListener("submit", exportModels);
 $("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs[state.runs.length - 1].number}`, "DELETE")));
 $("name").addEventListener("change", quietly(e => api("api/settings", "PUT", { name: e.target.value })));
-api("api/project").then(render).catch(() => 0);
-const events = new EventSource("api/events");
-events.addEventListener("message", e => render(JSON.parse(e.data)));
-events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
-events.addEventListener("open", () => alarm());
+addEventListener("DOMContentLoaded", () => {  // when the other scripts listen
+  api("api/project").then(render).catch(() => 0);
+  const events = new EventSource("api/events");
+  events.addEventListener("message", e => render(JSON.parse(e.data)));
+  events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
+  events.addEventListener("open", () => alarm());
+});

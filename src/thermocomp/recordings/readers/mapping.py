@@ -20,6 +20,7 @@ from thermocomp.files.tomlfile import as_json, read_toml
 from thermocomp.recordings.cleaning import Cut, Resample, Rezero, Shift, Swap
 from thermocomp.recordings.declared import Declared, ExpandingBody, HeaderData, MeasuringUncertainty, Workpiece
 from thermocomp.recordings.readers.limits import FileLimits
+from thermocomp.recordings.rows import Instant
 
 #: a column by its heading or 1-based number
 Place = str | int
@@ -163,11 +164,14 @@ class CycleRule:
         Column of labels; empty: a column named ``cycle``, else the spindle speed.
     min_run_s, min_stop_s : float
         Shorter runs and stops of the spindle do not split the test [s].
+    starts : tuple of Instant
+        Times at which the cycles begin, except for the first; they replace labels and speed.
     """
 
     column: Place = ""
     min_run_s: float = 300.0
     min_stop_s: float = 300.0
+    starts: tuple[Instant, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
 from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
-from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
+from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_at, split_by_labels
 from thermocomp.recordings.headings import understand
 from thermocomp.recordings.readers.columns import ColumnPlan, plan
 from thermocomp.recordings.readers.datecheck import check_dates
@@ -104,6 +104,7 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
         extra={h: file.cells[k].tolist() for h, k in more.items()},
         min_run=mapping.cycles.min_run_s,
         min_stop=mapping.cycles.min_stop_s,
+        starts=mapping.cycles.starts,
         most_cycles=mapping.limits.cycles,
         aliases=columns.aliases,
         notes=_shorten(notes, len(numeric)),
@@ -294,16 +295,18 @@ def _labels(file: FileCells) -> list[Any] | None:
 
 
 def _cycles(recording: Recording, labels: Sequence[Any] | None, rows: Rows) -> tuple[Cycle, ...]:
-    speed = recording.speed
-    if labels is not None:
-        try:
+    values = None if recording.speed is None else recording.table[recording.speed.name].to_numpy()
+    try:
+        if rows.starts:
+            starts = [rows.seconds(at, "[cycles] starts") - recording.origin for at in rows.starts]
+            found = split_at(recording.time, starts, values)
+        elif labels is not None:
             found = split_by_labels(labels)
-        except RecordingError as e:
-            raise RecordingError(f"{recording.source}: {e}") from e
-    elif speed is None:
-        found = make_single_cycle(len(recording))
-    else:
-        values = recording.table[speed.name].to_numpy()
-        found = find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
+        elif values is None:
+            found = make_single_cycle(len(recording))
+        else:
+            found = find_cycles(recording.time, values, min_run=rows.min_run, min_stop=rows.min_stop)
+    except RecordingError as e:
+        raise RecordingError(f"{recording.source}: {e}") from e
     FileLimits(cycles=rows.most_cycles).check("cycles", len(found), recording.source)
     return found

@@ -126,6 +126,7 @@ function show(figure, number) {
   });
   new ResizeObserver(() => { for (const u of plots) u.setSize({ width: Math.max(240, box.clientWidth), height: u.height }); }).observe(box);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { for (const u of plots) u.redraw(); });
+  return plots;
 }
 
 addEventListener("DOMContentLoaded", () => {

@@ -1,0 +1,32 @@
+"use strict";
+// Two runs side by side, of this project or of another one: results by deviation and method, and what was chosen differently.
+{
+  const fill = (select, runs, wanted) => select.replaceChildren(...runs.filter(r => r.state !== "running").reverse().map(r => new Option(`${r.number} (${r.began.slice(0, 10)})`, r.number, false, r.number === wanted)));
+  const other = () => $("other").value.trim();
+
+  document.addEventListener("state", () => {
+    const runs = state.runs, last = runs.length;
+    $("beside").hidden = !last;
+    if ($("run-a").dataset.known === runs.map(r => r.number + r.state).join()) return;
+    $("run-a").dataset.known = runs.map(r => r.number + r.state).join();
+    fill($("run-a"), runs, runs[last - 1] && runs[last - 1].number);
+    if (!other()) fill($("run-b"), runs, runs[last - 2] && runs[last - 2].number);
+  });
+
+  $("other").addEventListener("focus", quietly(async () => $("projects").replaceChildren(...(await api("api/projects")).projects.map(p => new Option(p)))), { once: true });
+  $("other").addEventListener("change", quietly(async () => {
+    const { runs } = other() ? await api(`api/others?${new URLSearchParams({ project: other() })}`) : state;
+    fill($("run-b"), runs, runs.length && runs[runs.length - 1].number);
+  }));
+
+  const cells = one => one ? [one.rms_um, one.worst ? `${um(one.worst[0])} in ${one.worst[1]}` : "–", element("span", one.verdict + (one.written ? " (used)" : ""), one.verdict.split(" ")[0])] : ["–", "–", "not compared"];
+  $("beside").addEventListener("submit", quietly(async event => {
+    event.preventDefault();
+    const [a, b] = [$("run-a").value, $("run-b").value];
+    if (!a || !b) return alarm("Choose two runs.");
+    const { rows, differences } = await api(`api/runs/${a}/beside/${b}?${new URLSearchParams({ project: other() })}`);
+    const names = [`run ${b}${other() ? " there" : ""}`, `run ${a}`], head = ["deviation", "method", ...names.flatMap(n => [`RMS [um], ${n}`, `worst cycle [um], ${n}`, `verdict, ${n}`])];
+    $("compared").replaceChildren(element("h3", `From ${names[0]} to ${names[1]}`), differences.length ? element("ul", "", "", ...differences.map(d => element("li", d))) : element("p", "The choices are the same."),
+      table(head, rows.map(r => [r.target, r.model, ...cells(r.of[0]), ...cells(r.of[1])])));
+  }));
+}

@@ -1,0 +1,58 @@
+"use strict";
+// The next test with its NC program; the live configuration, and its trial with a replay of the recording.
+{
+  const form = $("next"), DEFAULTS = { hours: 12, swing: 5, probe_every: 30, dialect: "linuxcnc", proof: false };
+  let filled = false;
+
+  document.addEventListener("state", () => {
+    if (filled) return;
+    filled = true;
+    for (const [key, value] of Object.entries(state.settings.plan || {})) {
+      const input = form.elements[key];
+      if (input) if (input.type === "checkbox") input.checked = value; else input.value = value;
+    }
+  });
+
+  form.addEventListener("submit", quietly(async event => {
+    event.preventDefault();
+    const plan = { ...(state.settings.plan || {}) };
+    for (const input of form.elements) {
+      if (!input.name) continue;
+      const value = input.type === "checkbox" ? input.checked : input.type === "number" ? input.value && Number(input.value) : input.value;
+      if (value === "" || value === DEFAULTS[input.name]) delete plan[input.name]; else plan[input.name] = value;
+    }
+    await api("api/settings", "PUT", { plan });
+    await api("api/runs", "POST");
+    $("planned").replaceChildren(element("p", "Planning; the progress is shown in step 2 ...", "quiet"));
+  }));
+
+  document.addEventListener("result", e => {
+    const { run, results } = e.detail, steps = run.steps.filter(s => s.name === "plan"), step = steps[steps.length - 1];
+    const range = c => `${um(c.gain_um)} (${um(c.gain_range_um[0])} to ${um(c.gain_range_um[1])})`;
+    if (step && results.plan) {
+      const links = step.files.filter(f => !f.endsWith(".json")).flatMap(f => [link(run, f, f.split("/")[1]), " · "]).slice(0, -1);
+      for (const a of links) if (a.href && !a.href.endsWith(".png")) a.download = a.textContent;
+      $("planned").replaceChildren(element("h2", "The next test"), element("p", step.text), element("p", "NC program, measurement sheet and figure: ", "", ...links),
+        element("h3", "Tests considered"), table(["test", "expected gain [um]", "new"], results.plan.candidates.map(c => [c.words, range(c), c.news])));
+    } else $("planned").replaceChildren(element("p", "Nothing is planned yet.", "quiet"));
+    if (run.state === "failed") $("planned").prepend(element("p", run.error, "trouble"));
+    live(run);
+  });
+
+  const live = quietly(async run => {
+    const box = $("live"), fitted = run.steps.some(s => s.files.includes("live.toml"));
+    if (!fitted) return box.replaceChildren();
+    const now = await api("api/live"), file = link(run, "live.toml", "live.toml");
+    file.download = "live.toml";
+    const said = element("p", "", "", now.address ? `Run ${now.run} is tried at ` : "");
+    said.setAttribute("role", "status");
+    if (now.address) { const page = element("a", now.address); page.href = now.address; page.target = "_blank"; page.rel = "noreferrer"; said.append(page); }
+    const start = button("Try it live", quietly(async () => {
+      said.textContent = "The live page starts ..."; start.disabled = true;
+      try { await api(`api/live/${run.number}`, "POST"); } finally { live(run); }
+    }));
+    const stop = button("End the trial", quietly(async () => { await api("api/live", "DELETE"); live(run); }));
+    box.replaceChildren(element("h2", "Live"), element("p", "Configuration of thermocomp serve for these models, to be edited for the machine: ", "", file),
+      element("p", "The live page in shadow, with the recording replayed 60 times faster: ", "", now.address ? stop : start), said);
+  });
+}
