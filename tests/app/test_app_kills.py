@@ -115,20 +115,18 @@ def look(folder: Path, shown: Shown) -> None:
     """Assert that the project opens, with what was confirmed, and that each file is whole."""
     content = Store(folder).content()
     Project(folder)
-    assert int(content["name"]) in (shown.name, shown.asked_name)
+    assert shown.name <= int(content["name"]) <= shown.asked_name  # what was asked for at a kill may have been done
     mapping = next((r.get("mapping") for r in content["recordings"] if r["file"] == DRIFT), None)
     scale = float((folder / mapping).read_text().partition("scale = ")[2].split()[0]) if mapping else 1.0
-    assert scale in (shown.scale, shown.asked_scale)
+    assert shown.scale <= scale <= shown.asked_scale
     named = {r["file"] for r in content["recordings"]}
     assert set(shown.dropped) <= named
     for file in (folder / "files").glob("more*.csv"):
         assert file.read_bytes() in shown.sent
-    for file, text in shown.dropped.items():
-        assert (folder / file).read_bytes() == text
+    assert all((folder / file).read_bytes() == text for file, text in shown.dropped.items())
     for run in runs_of(folder):
         state = run.read()
-        for name in (name for step in state["steps"] for name in step["files"]):
-            assert (run.path / name).stat().st_size > 0
+        assert all((run.path / name).stat().st_size for step in state["steps"] for name in step["files"])
         for path in (p for p in run.path.iterdir() if not is_scratch(p.name)):
             if path.name == "model.json":
                 modelfile.read(path)
@@ -145,12 +143,11 @@ def test_nothing_shown_as_saved_is_lost(tmp_path: Path, kills: int) -> None:
     folder, shown, lot = small_project(tmp_path / "project"), Shown(), random.Random(kills)
     edited = folder / "project.toml"
     edited.write_text(edited.read_text(encoding="utf-8").replace("Small machine", "0"), encoding="utf-8")
-    for _ in range(kills):
+    for k in range(kills):
         kill_once(folder, shown, lot)
         look(folder, shown)
+        print(f"{k + 1} kills: {shown.name} settings, {shown.scale} mappings, {len(shown.dropped)} files", flush=True)
     document = Store(folder).document()
     document["recordings"] = [{"file": DRIFT}]
     edited.write_text(document.as_string(), encoding="utf-8")
     assert run_project(Project(folder), silent, again=True).folder.read()["state"] == "done"
-    runs = len(runs_of(folder))
-    print(f"{kills} kills: {shown.name} settings, {shown.scale} mappings, {len(shown.dropped)} files, {runs} runs")

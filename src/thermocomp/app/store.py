@@ -25,6 +25,8 @@ LARGEST = 1_000_000_000
 #: names of files that every system accepts
 _PLAIN = re.compile(r"[^\w .()+-]")
 _NEW = 'name = ""\n'
+#: CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW: Ctrl-C and the closed window of the page do not end a run on Windows
+_OWN_CONSOLE = 0x0000_0200 | 0x0800_0000
 
 
 class Store:
@@ -240,8 +242,8 @@ class Store:
         """
         if self._run is not None and self._run.poll() is None:
             raise InputError("a run is going on: stop it first, or wait for its end")
-        words = [sys.executable, "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
-        more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {}
+        words = [sys.executable, "-X", "utf8", "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
+        more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {"creationflags": _OWN_CONSOLE}
         nothing = subprocess.DEVNULL
         with (self.folder / "run.log").open("ab") as log:
             self._said = log.tell()

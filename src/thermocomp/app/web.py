@@ -21,7 +21,7 @@ from starlette.exceptions import HTTPException
 from thermocomp.app.runfolder import RunFolder, runs_of
 from thermocomp.app.store import LARGEST, Store, find_inside
 from thermocomp.core.exceptions import InputError
-from thermocomp.live.page.doors import Door, Json
+from thermocomp.live.page.doors import Door, Json, declare_types
 
 _HERE = Path(__file__).parent
 #: largest settings, and answers to questions about a file [bytes]
@@ -52,6 +52,7 @@ def make_app(store: Store, token: str = "") -> FastAPI:
     )
     app.state.token = token
     app.add_middleware(Door, most=_largest, private=True)
+    declare_types()
     static = StaticFiles(directory=_HERE / "static", packages=[("thermocomp.report", "static")])
     app.mount(f"/{token}/static", static)
     app.include_router(_files(store), prefix=f"/{token}")

@@ -3,6 +3,7 @@
 import contextlib
 import hmac
 import json
+import mimetypes
 import re
 import socket
 import time
@@ -46,6 +47,12 @@ class Json(JSONResponse):
     def render(self, content: Any) -> bytes:
         """Return the content of the response as bytes; see `write_json`."""
         return write_json(content)
+
+
+def declare_types() -> None:
+    """Declare the types of the files of a page: Windows may take scripts for plain text, which browsers do not run."""
+    mimetypes.add_type("text/javascript", ".js")
+    mimetypes.add_type("text/css", ".css")
 
 
 def write_json(content: Any) -> bytes:
