@@ -22,7 +22,7 @@ from thermocomp.app.web import make_app
 from thermocomp.core.exceptions import InputError
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Dialog, Page
 
 TOKEN = "a-secret-of-the-test"
 SCRIPT = "<img src=x onerror=window.hacked=1;alert(1)>"
@@ -61,9 +61,10 @@ def drop_many(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict
     async def ask(_: object, task: Mapping[str, Any]) -> dict[str, Any]:
         given = json.loads(json.dumps(dict(task)))
         try:
-            return json.loads(json.dumps(worker._TASKS[given.pop("task")](**given), allow_nan=False))
+            found: dict[str, Any] = json.loads(json.dumps(worker._TASKS[given.pop("task")](**given), allow_nan=False))
         except InputError as e:
             raise InputError(str(e)) from e
+        return found
 
     monkeypatch.setattr(workers.Workers, "ask", ask)
     found, sound = dict[int, int](), bases()
@@ -165,7 +166,12 @@ def test_no_name_runs_as_a_script(tmp_path: Path) -> None:
     with served(folder) as address, chromium() as browser:
         context, dialogs = browser.new_context(bypass_csp=True), list[str]()  # the policy would hide a fault
         page = context.new_page()
-        context.on("dialog", lambda d: (dialogs.append(d.message), d.dismiss()))
+
+        def dismiss(dialog: "Dialog") -> None:
+            dialogs.append(dialog.message)
+            dialog.dismiss()
+
+        context.on("dialog", dismiss)
         page.goto(address)
         page.set_input_files("#chosen", [tmp_path / f"{SCRIPT}.csv", tmp_path / "hopeless.csv"])
         page.wait_for_selector("#recordings .card >> nth=1 >> .trouble", timeout=120_000)

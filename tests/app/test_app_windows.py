@@ -2,6 +2,7 @@
 
 import asyncio
 import mimetypes
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -68,6 +69,18 @@ def test_scripts_are_scripts_whatever_the_system_calls_them(tmp_path: Path) -> N
         async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1/token/static/") as client:
             for path, kind in (("app.js", "javascript"), ("uplot.min.js", "javascript"), ("app.css", "css")):
                 assert (await client.get(path)).headers["content-type"].startswith(f"text/{kind}")
+
+    asyncio.run(work())
+
+
+def test_the_command_of_a_folder_with_blanks_can_be_copied(tmp_path: Path) -> None:
+    folder = tmp_path / "my project"
+    transport = httpx.ASGITransport(app=make_app(Store(folder), "token"))
+
+    async def work() -> None:
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1/token/") as client:
+            command = (await client.get("api/project")).json()["command"]
+        assert shlex.split(command) == ["thermocomp", "run", str(folder)]
 
     asyncio.run(work())
 

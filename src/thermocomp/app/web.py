@@ -3,7 +3,10 @@
 import asyncio
 import json
 import mimetypes
+import os
 import secrets
+import shlex
+import subprocess
 import time
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
@@ -195,7 +198,8 @@ def _state(store: Store) -> dict[str, Any]:
     runs = [r.read() for r in runs_of(store.folder)]
     for run in runs:
         run.pop("seen", None)
-    command = f"thermocomp run {store.folder}"
+    words = ["thermocomp", "run", str(store.folder.resolve())]
+    command = shlex.join(words) if os.name == "posix" else subprocess.list2cmdline(words)
     told = {"command": command, "trouble": store.trouble()}
     return {"folder": str(store.folder), "settings": store.content(), "runs": runs, **told}
 
