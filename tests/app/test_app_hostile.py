@@ -42,6 +42,17 @@ FILE_NAMES = [
     "-rf",
     *NAMES,
 ]
+#: files of a kind of their own that take little time
+QUICK = [
+    "parquet kinds",
+    "parquet bytes",
+    "parquet nested",
+    "utf-16",
+    "formulas",
+    "own format",
+    "cell beyond",
+    "entities",
+]
 #: memory of a process that reads a file [MB]
 MOST = 700
 
@@ -73,6 +84,8 @@ def drop_many(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict
         store = Store(folder)
         transport = httpx.ASGITransport(app=make_app(store, TOKEN))
         async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
+            for kind in QUICK:
+                await drop(client, f"{kind}.{HOSTILE[kind][0]}", HOSTILE[kind][1]())
             for k in range(count):
                 ending, content = damaged(k, sound)
                 lot = random.Random(k)
