@@ -11,7 +11,10 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.files import pdf
 from thermocomp.files.pdf import find_browser, write_pdf
 
-BIG = '<!doctype html><html><head><title>t</title></head><body><p>a</p>{}<p style="break-before: page">b</p></body></html>'
+BIG = (
+    "<!doctype html><html><head><title>t</title></head>"
+    '<body><p>a</p>{}<p style="break-before: page">b</p></body></html>'
+)
 
 
 def pages(path: Path) -> int:

@@ -3,9 +3,11 @@
 from pathlib import Path
 
 import pytest
+from drifttests import write_drift
 
 from thermocomp.recordings.checks.quality import check, lasting_trouble, troubled_rows
 from thermocomp.recordings.readers.mapping import read_mapping
+from thermocomp.recordings.readers.mending import mend, take_best
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
 from thermocomp.virtual import datasets as virtual
@@ -73,3 +75,9 @@ def test_a_measured_printer_raises_no_trouble_once_it_is_mapped(shared_data: Pat
 def test_the_examples_of_the_pages_raise_no_trouble(name: str, mapping: str | None) -> None:
     files = ROOT / "docs" / "files"
     assert _trouble(read(files / name, read_mapping(files / mapping) if mapping else None)) == []
+
+
+def test_work_at_the_same_hours_of_each_day_is_no_clock(tmp_path: Path) -> None:
+    """The air warms up with the day, as the machine does: four weeks of a logger."""
+    (path,) = write_drift("month.csv", tmp_path)
+    assert check(mend(str(path), "", take_best).recording) == ()

@@ -193,7 +193,7 @@ def settings_of(content: Mapping[str, Any], source: str | Path) -> ProjectSettin
     except ValidationError as e:
         told = []
         for error in e.errors(include_url=False):
-            *_, last = error["loc"]
+            last = error["loc"][-1] if error["loc"] else ""  # a text with half a character has no place
             keys = ".".join(map(str, find_keys(error["loc"], content)))
             match error["type"]:
                 case "unexpected_keyword_argument" | "extra_forbidden":

@@ -25,6 +25,8 @@ LARGEST = 1_000_000_000
 #: names of files that every system accepts
 _PLAIN = re.compile(r"[^\w .()+-]")
 _NEW = 'name = ""\n'
+#: CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW: Ctrl-C and the closed window of the page do not end a run on Windows
+_OWN_CONSOLE = 0x0000_0200 | 0x0800_0000
 
 
 class Store:
@@ -50,6 +52,8 @@ class Store:
         if not (folder / NAME).exists():
             write_text(_NEW, folder / NAME, overwrite=False)
         self.editing, self.workers = asyncio.Lock(), Workers()
+        self._run: subprocess.Popen[bytes] | None = None
+        self._said = 0
         self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
         self.document()
 
@@ -226,6 +230,34 @@ class Store:
             self._read[name] = (known, found)
             return found
 
+    # -- runs ----------------------------------------------------------------------------------------------------------
+
+    def start_run(self, *, again: bool) -> None:
+        """Start a run of the project as a process that does not end with this one.
+
+        Raises
+        ------
+        InputError
+            The last one that was started here has not ended.
+        """
+        if self._run is not None and self._run.poll() is None:
+            raise InputError("a run is going on: stop it first, or wait for its end")
+        words = [sys.executable, "-X", "utf8", "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
+        more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {"creationflags": _OWN_CONSOLE}
+        nothing = subprocess.DEVNULL
+        with (self.folder / "run.log").open("ab") as log:
+            self._said = log.tell()
+            self._run = subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=self.folder, **more)
+
+    def trouble(self) -> str:
+        """Return what the last run that was started here said if it refused its input, maybe before it had a folder."""
+        if self._run is None or self._run.poll() != 2:
+            return ""
+        with suppress(OSError), (self.folder / "run.log").open("rb") as log:
+            log.seek(self._said)
+            return " ".join(log.read(10_000).decode(errors="replace").split())
+        return ""
+
     def _text(self, mapping: str) -> str:
         return read_text(find_inside(self.folder, mapping), "mapping file", MOST) if mapping else ""
 
@@ -241,17 +273,8 @@ def find_inside(folder: Path, name: str) -> Path:
     try:
         path = folder / name
         if path.resolve().is_relative_to(folder.resolve()):
+            path.exists()  # fails for a name that is too long
             return path
-    except ValueError:  # a null character
+    except (OSError, ValueError):  # a null character, half a character
         pass
     raise InputError(f"{name!r}: the file is not in the project's folder; copy it there")
-
-
-def start_run(folder: Path, *, again: bool) -> None:
-    """Start a run of a project as a process that does not end with this one."""
-    words = [sys.executable, "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
-    more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {}
-    nothing = subprocess.DEVNULL
-    log = (folder / "run.log").open("ab")
-    with log:
-        subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=folder, **more)

@@ -3,9 +3,12 @@
 import asyncio
 import json
 import mimetypes
+import os
 import secrets
+import shlex
+import subprocess
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +16,7 @@ import jinja2
 import tomlkit
 from fastapi import APIRouter, Body, FastAPI, Request
 from fastapi import Path as InPath
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
@@ -20,9 +24,9 @@ from starlette.exceptions import HTTPException
 from thermocomp.app.comparing import read_json as _json
 from thermocomp.app.runfolder import runs_of
 from thermocomp.app.runviews import run_of, view_runs
-from thermocomp.app.store import LARGEST, Store, find_inside, start_run
+from thermocomp.app.store import LARGEST, Store, find_inside
 from thermocomp.core.exceptions import InputError
-from thermocomp.live.page.doors import Door, Json
+from thermocomp.live.page.doors import Door, Json, declare_types
 
 _HERE = Path(__file__).parent
 #: largest settings, and answers to questions about a file [bytes]
@@ -43,9 +47,17 @@ def make_app(store: Store, token: str = "") -> FastAPI:
         Default: a random one.
     """
     token = token or secrets.token_urlsafe(24)
-    app = FastAPI(title="thermocomp app", docs_url=None, redoc_url=None, default_response_class=Json)
+    # its description names the token in every path
+    app = FastAPI(
+        title="thermocomp app",
+        openapi_url=f"/{token}/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        default_response_class=Json,
+    )
     app.state.token = token
-    app.add_middleware(Door, most=_largest)
+    app.add_middleware(Door, most=_largest, private=True)
+    declare_types()
     static = StaticFiles(directory=_HERE / "static", packages=[("thermocomp.report", "static")])
     app.mount(f"/{token}/static", static)
     app.include_router(_files(store), prefix=f"/{token}")
@@ -55,6 +67,11 @@ def make_app(store: Store, token: str = "") -> FastAPI:
     @app.exception_handler(HTTPException)
     async def refuse(_: Request, error: HTTPException) -> Json:
         return Json({"detail": error.detail}, error.status_code, error.headers)
+
+    @app.exception_handler(RequestValidationError)
+    async def list_wrong(_: Request, error: RequestValidationError) -> Json:
+        told = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        return Json({"detail": "; ".join(told)}, 422)
 
     @app.exception_handler(InputError)
     async def explain(_: Request, error: InputError) -> Json:
@@ -85,18 +102,12 @@ def _files(store: Store) -> APIRouter:
     @router.put("/api/settings")
     async def change(content: Annotated[dict[str, Any], Body()]) -> Json:
         async with store.editing:
-            document = store.document()
-            for key, value in content.items():
-                if value is None:
-                    document.pop(key, None)
-                else:
-                    document[key] = value
-            await store.save(_encodable(document))
+            await store.save(_changed(store.document(), content))
         return Json(_state(store))
 
     @router.put("/api/drop/{name}")
     async def drop(name: str, request: Request) -> Json:
-        file = await store.receive(name, request.stream())
+        file = await store.receive(name, _parts(request))
         return Json({"file": file, **await store.adopt(file)})
 
     @router.get("/api/recordings/{name:path}")
@@ -134,7 +145,7 @@ def _results(store: Store) -> APIRouter:
     async def start(again: bool = False) -> Json:
         if not store.content().get("recordings"):
             raise InputError("the project has no recording: drop a file on the page first")
-        start_run(store.folder, again=again)
+        store.start_run(again=again)
         return Json({"started": True})
 
     @router.delete("/api/runs/{number}")
@@ -164,6 +175,15 @@ def _results(store: Store) -> APIRouter:
     return router
 
 
+async def _parts(request: Request) -> AsyncIterator[bytes]:
+    """Return the content of a request of any duration, as long as something arrives."""
+    connection = getattr(request.state, "connection", None)
+    async for part in request.stream():
+        if connection is not None:
+            connection.heard()
+        yield part
+
+
 async def _events(store: Store) -> AsyncIterator[bytes]:
     """Return the state of the project whenever it has changed, and a comment every ten seconds."""
     last, spoke = "", time.monotonic()
@@ -182,13 +202,22 @@ def _state(store: Store) -> dict[str, Any]:
     runs = [r.read() for r in runs_of(store.folder)]
     for run in runs:
         run.pop("seen", None)
-    command = f"thermocomp run {store.folder}"
-    return {"folder": str(store.folder), "settings": store.content(), "runs": runs, "command": command}
+    words = ["thermocomp", "run", str(store.folder.resolve())]
+    command = shlex.join(words) if os.name == "posix" else subprocess.list2cmdline(words)
+    told = {"command": command, "trouble": store.trouble()}
+    return {"folder": str(store.folder), "settings": store.content(), "runs": runs, **told}
 
 
-def _encodable(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
-    """Return settings that were changed by JSON, after a look whether TOML can hold them."""
+def _changed(document: tomlkit.TOMLDocument, content: Mapping[str, Any]) -> tomlkit.TOMLDocument:
+    """Return settings with tables changed by JSON, after a look whether TOML can hold them; null removes a table."""
     try:
-        return tomlkit.parse(tomlkit.dumps(document))
-    except (tomlkit.exceptions.TOMLKitError, ValueError, TypeError) as e:
+        for key, value in content.items():
+            if value is None:
+                document.pop(key, None)
+            else:
+                document[key] = value
+        text = tomlkit.dumps(document)
+        text.encode()  # half a character
+        return tomlkit.parse(text)
+    except (tomlkit.exceptions.TOMLKitError, ValueError, TypeError, RecursionError) as e:
         raise InputError(f"these settings cannot be written as TOML: {e}") from e

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from tomlkit.exceptions import TOMLKitError
+
 from thermocomp.app.project import settings_of
 from thermocomp.app.store import NAME
 from thermocomp.core.exceptions import InputError
@@ -46,7 +48,11 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
     """
     draft = Draft(mapping)
     for answer in answers:
-        draft.add(answer)
+        try:
+            draft.add(answer)
+            draft.text.encode()  # half a character
+        except (AttributeError, TypeError, ValueError, TOMLKitError) as e:
+            raise InputError(f"{str(answer)[:200]} is no entry of a mapping: {e}") from e
     text = draft.text
     try:
         mended = mend(file, text, take_best if guess else lambda _: None)

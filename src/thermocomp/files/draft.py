@@ -13,6 +13,7 @@ import errno
 import os
 import shutil
 import stat
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -24,6 +25,10 @@ from thermocomp.files.scratch import is_scratch, scratch
 
 #: errors of file systems that cannot flush folders
 _NO_FLUSH = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
+
+
+#: Windows does not replace a file that a program is reading just now: pauses between attempts [s]
+HELD = () if os.name == "posix" else (0.01, 0.05, 0.2, 0.5, 1.0)
 
 
 class Drafts(dict[Path, Path]):
@@ -99,7 +104,12 @@ class _Move(NamedTuple):
             shutil.copy2(self.place, self.old)
 
     def replace(self) -> None:
-        """Move the draft to its target."""
+        """Move the draft to its target; where a reader can prevent it for a moment, try again."""
+        for pause in HELD:
+            with suppress(PermissionError):
+                self.path.replace(self.place)
+                return
+            time.sleep(pause)
         self.path.replace(self.place)
 
     def add(self) -> None:

@@ -147,6 +147,7 @@ function minutes(s) { return s < 90 ? `${Math.max(1, Math.round(s))} s` : `${Mat
 function progress(run) {
   const box = $("progress"), running = run && run.state === "running";
   $("stop").hidden = !running;
+  if (state.trouble && !running && run?.state !== "failed") return box.replaceChildren(element("p", state.trouble, "failed"));
   if (!run) return box.replaceChildren();
   if (!running) return box.replaceChildren(run.error ? element("p", `Run ${run.number} ${run.state}: ${run.error}`, run.state) : "");
   const bar = element("progress"), spent = Date.now() / 1000 - run.step_began;

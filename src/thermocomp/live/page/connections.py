@@ -40,6 +40,10 @@ class Guarded(H11Protocol):
         self._since, self._served = time.monotonic(), True
         super().on_response_complete()
 
+    def heard(self) -> None:
+        """Note that part of a long request has arrived: it may go on."""
+        self._since = time.monotonic()
+
     @property
     def unsent(self) -> int:
         """Number of answer bytes not accepted by the system, which already buffers unread data."""

@@ -3,6 +3,7 @@
 import contextlib
 import hmac
 import json
+import mimetypes
 import re
 import socket
 import time
@@ -46,6 +47,12 @@ class Json(JSONResponse):
     def render(self, content: Any) -> bytes:
         """Return the content of the response as bytes; see `write_json`."""
         return write_json(content)
+
+
+def declare_types() -> None:
+    """Declare the types of the files of a page: Windows may take scripts for plain text, which browsers do not run."""
+    mimetypes.add_type("text/javascript", ".js")
+    mimetypes.add_type("text/css", ".css")
 
 
 def write_json(content: Any) -> bytes:
@@ -99,12 +106,19 @@ class Door:
         Host names of the page, in addition to ``localhost`` and the addresses of this computer.
     most : callable
         Function that returns the maximum size of a request [bytes].
+    private : bool
+        Pages that only display may be linked to, but scripts of other pages get nothing of them.
     """
 
     def __init__(
-        self, app: ASGIApp, names: Collection[str] = (), most: Callable[[Request], int] = lambda _: MOST_BYTES
+        self,
+        app: ASGIApp,
+        names: Collection[str] = (),
+        most: Callable[[Request], int] = lambda _: MOST_BYTES,
+        *,
+        private: bool = False,
     ) -> None:
-        self._app, self._most = app, most
+        self._app, self._most, self._private = app, most, private
         self._names = {"localhost", *map(_as_browsers_write, names)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -127,7 +141,8 @@ class Door:
         if why := explain_host(headers.get("host", ""), self._names, server[0] if server else ""):
             return 400, why
         # pages that only display may be linked to; those that answer or change something are for this page alone
-        shows = request.method in ("GET", "HEAD") and not request.url.path.startswith("/api/")
+        shows = request.method in ("GET", "HEAD") and "/api/" not in request.url.path
+        shows = shows and not (self._private and "origin" in headers)  # a link states none
         if not shows and (why := explain_foreign(request)):
             return 403, why
         length, most = headers.get("content-length", "0"), self._most(request)

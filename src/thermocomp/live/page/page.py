@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException as AnyHTTPException
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.plugins import describe_plugin, find_plugins, load_plugin
 from thermocomp.live.loop import Service
-from thermocomp.live.page.doors import Door, Json
+from thermocomp.live.page.doors import Door, Json, declare_types
 from thermocomp.live.page.pages import Board, MakeRouter
 
 _STATIC = Path(__file__).parent / "static"
@@ -28,6 +28,7 @@ def make_app(
     """
     app = FastAPI(title="thermocomp", docs_url=None, redoc_url=None, default_response_class=Json)
     app.add_middleware(Door, names=hosts)
+    declare_types()
     app.mount("/static", StaticFiles(directory=_STATIC, packages=[("thermocomp.report", "static")]))  # uPlot is there
 
     @app.exception_handler(AnyHTTPException)

@@ -44,7 +44,7 @@ def holds_own_date(table: FileTable, number: int) -> bool:
     columns = [k for k in range(len(table.headings)) if find_kind(table.head(k)) not in ("date", "stamp")]
     cells = table.load([], columns)[0]
     row = next((k for k in range(len(cells)) if int(table.place(k).split()[-1]) == number), None)
-    return row is not None and any(map(holds_date, cells.iloc[row].dropna().astype(str)))
+    return row is not None and any(map(holds_date, map(str, cells.iloc[row].dropna())))
 
 
 def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -> tuple[str, ...]:

@@ -299,6 +299,8 @@ def _explain(failure: ValidationError) -> str:
     """Return the table, the key and the nearest known key for the first error of pydantic."""
     errors = failure.errors()
     error = min(errors, key=lambda e: "missing" in e["type"])  # a misspelt key first
+    if not error["loc"]:  # a text with half a character
+        return error["msg"]
     if error["loc"][:1] == ("clean",):
         return _explain_step(error)
     depth = 3 if error["loc"][0] in ("columns", "expansion") else 2

@@ -94,6 +94,13 @@ class Draft:
 
     def __init__(self, text: str = "") -> None:
         self.document = tomlkit.parse(text)
+        #: names of the tables by column: a file may have thousands
+        self._columns: dict[object, str] = {}
+        tables = self.document.get("columns")
+        for name, table in [*tables.items()][::-1] if isinstance(tables, dict) else ():
+            place = table.get("column", name) if isinstance(table, dict) else name
+            if isinstance(place, str | int):  # what is wrong otherwise is told where the mapping is read
+                self._columns[place] = str(name)
 
     @property
     def text(self) -> str:
@@ -107,26 +114,29 @@ class Draft:
 
     def add(self, remedy: Remedy) -> bool:
         """Add a suggested entry to the mapping; return False if it is already there."""
-        before = copy.deepcopy(self.document.unwrap())
+        changed = False
         for key, content in remedy.items():
+            changed |= key not in self.document
             if key == "clean":
                 steps = self.document.setdefault(key, tomlkit.aot())
                 for step in content:
                     if step not in steps.unwrap():
                         steps.append(_table(step))
+                        changed = True
             elif key == "columns":
                 tables = self.document.setdefault(key, tomlkit.table(is_super_table=True))
                 for name, said in content.items():
-                    _update(tables.setdefault(self._named(name, said), tomlkit.table()), said)
+                    named = self._named(name, said)
+                    changed |= named not in tables
+                    changed |= _update(table := tables.setdefault(named, tomlkit.table()), said)
+                    self._columns[table.get("column", named)] = named
             else:
-                _update(self.document.setdefault(key, tomlkit.table()), content)
-        return bool(before != self.document.unwrap())
+                changed |= _update(self.document.setdefault(key, tomlkit.table()), content)
+        return changed
 
     def _named(self, name: str, said: Remedy) -> str:
         """Return the name of the existing table for a column, or the suggested name."""
-        place = said.get("column", name)
-        tables = self.document.get("columns", {})
-        return next((n for n, table in tables.items() if table.get("column", n) == place), name)
+        return self._columns.get(said.get("column", name), name)
 
 
 @dataclass(frozen=True)
@@ -335,9 +345,12 @@ def _table(content: Remedy) -> Table:
     return table
 
 
-def _update(table: Any, content: Remedy) -> None:
+def _update(table: Any, content: Remedy) -> bool:
+    """Add entries to a table; return whether it has changed."""
+    before = table.unwrap()
     for key, value in content.items():
         if isinstance(value, list) and key in ("skip", "missing") and key in table:
             table[key] = [*table[key], *(v for v in value if v not in table[key])]
         else:
             table[key] = value
+    return bool(before != table.unwrap())
