@@ -26,6 +26,7 @@ PACKAGE = Path(thermocomp.__file__).parent
 SHELTERS = {"draft", "drafts", "scratch"}
 #: functions that write into a draft or a folder that they are given
 GIVEN = {
+    "app/livetrial.py": {"": 1},  # what a trial prints, only for its error
     "app/runfolder.py": {"ask_to_stop": 1},  # an empty file that the run takes away
     "app/store.py": {"start_run": 1},  # what a run prints is added to its log
     "nc/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
@@ -39,6 +40,7 @@ GIVEN = {
 }
 #: who writes files; each is a kind in `allwriters.WRITERS`, or stands behind one
 WRITING = {
+    "app/livetrial.py",
     "app/runfolder.py",
     "app/running.py",
     "app/store.py",
