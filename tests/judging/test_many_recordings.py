@@ -10,6 +10,7 @@ from test_cluster import assert_same
 
 import thermocomp as tc
 from thermocomp.api.results import Compared
+from thermocomp.models.methods import METHODS
 from thermocomp.recordings.recording import Recording
 
 #: a worker takes no more, as docs/many_recordings.rst says; its nanny would kill it
@@ -61,7 +62,7 @@ def test_all_methods_on_forty_recordings(killed: bool, forty: list[Recording], h
         assert (cluster.workers() == first) is not killed
         peaks = [peak_memory(pid) for pid in cluster.workers()]
     assert len(there.recordings) == 40
-    assert len(told) == 21
+    assert len(told) == len(METHODS)
     assert_same(there.comparison, here.comparison)
     print(f"most memory of a worker: {max(peaks) / 2**20:.0f} MiB")
     assert max(peaks) < BOUND
