@@ -7,9 +7,10 @@ import pytest
 
 import thermocomp as tc
 from thermocomp.cli.app import run
+from thermocomp.core import browsers
+from thermocomp.core.browsers import find_browser
 from thermocomp.core.exceptions import InputError
-from thermocomp.files import pdf
-from thermocomp.files.pdf import find_browser, write_pdf
+from thermocomp.files.pdf import write_pdf
 
 BIG = (
     "<!doctype html><html><head><title>t</title></head>"
@@ -44,7 +45,7 @@ def test_a_file_is_not_overwritten(tmp_path: Path) -> None:
 def test_without_a_browser_nothing_is_computed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(pdf, "BROWSERS", ("no-such-browser",))
+    monkeypatch.setattr(browsers, "BROWSERS", ("no-such-browser",))
     assert run(["check", "no-such-file.csv", "-o", str(tmp_path / "x.pdf")]) == 2
     assert "install one, or write .html" in " ".join(capsys.readouterr().err.replace("│", "").split())
 
@@ -54,7 +55,7 @@ def test_a_browser_that_prints_nothing_is_reported(tmp_path: Path, monkeypatch: 
     fake = tmp_path / "browser"
     fake.write_text("#!/bin/sh\necho first >&2\necho no display >&2\n")
     fake.chmod(0o755)
-    monkeypatch.setattr(pdf, "BROWSERS", (str(fake),))
+    monkeypatch.setattr(browsers, "BROWSERS", (str(fake),))
     with pytest.raises(InputError, match=r"printed no PDF \(no display\)"):
         write_pdf(BIG.format(""), tmp_path / "x.pdf", overwrite=False)
     assert not (tmp_path / "x.pdf").exists()

@@ -25,7 +25,6 @@ from thermocomp.cli.terminal import console
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.outputs import refuse_existing
 from thermocomp.core.plugins import find_plugins
-from thermocomp.files.pdf import find_browser
 from thermocomp.report.answer import CommandAnswer
 
 #: types of parameters on the command line, where Python accepts more types than a command line can express; a group of
@@ -94,8 +93,6 @@ class CommandFace:
             inputs = [v for v in _flat(given.values()) if isinstance(v, Path)]
             endings = () if callable(writes) else PAGES if writes == ".html" else (writes,)
             refuse_existing(files, self.overwrite, inputs, *endings)
-            if endings == PAGES and self.output.suffix.lower() == ".pdf":
-                find_browser()
 
     def write(self, writer: Callable[..., object]) -> None:
         """Write the result to the output file, if one is given."""

@@ -5,6 +5,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from thermocomp.core.browsers import find_browser
 from thermocomp.core.exceptions import InputError
 
 OTHERWISE = "choose another name or allow overwriting with --overwrite"
@@ -25,6 +26,8 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, inputs: Sequence[Pat
                 f"{path}: the file is written in the format {' or '.join(e[1:] for e in endings)}; name it "
                 f"{path.with_suffix(endings[0])}"
             )
+        if path.suffix.lower() == ".pdf":
+            find_browser()
 
 
 def find_place(target: Path) -> Path:

@@ -1,46 +1,17 @@
 """Pages as PDF, printed by a browser of the Chromium family, which is on almost every computer."""
 
 import os
-import shutil
 import subprocess
 import tempfile
 from pathlib import Path
 
+from thermocomp.core.browsers import find_browser
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import draft
 
-#: names in the search path, then usual places of Windows and macOS
-BROWSERS = (
-    "chromium",
-    "chromium-browser",
-    "google-chrome",
-    "google-chrome-stable",
-    "microsoft-edge",
-    "chrome",
-    "msedge",
-    r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
-    r"C:\Program Files\Google\Chrome\Application\chrome.exe",
-    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
-    "/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge",
-)
 PATIENCE = 120.0
 #: on paper, the pictures of a page stay; nothing in a page may run
 NO_SCRIPTS = """<head><meta http-equiv="Content-Security-Policy" content="script-src 'none'">"""
-
-
-def find_browser() -> str:
-    """Return the path of the browser that prints.
-
-    Raises
-    ------
-    InputError
-        None was found.
-    """
-    if found := next(filter(None, map(shutil.which, BROWSERS)), None):
-        return found
-    raise InputError(
-        "a PDF is printed by Chromium, Chrome or Edge, none of which was found; install one, or write .html instead"
-    )
 
 
 def write_pdf(page: str, target: Path, *, overwrite: bool) -> Path:
