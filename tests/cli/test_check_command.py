@@ -106,7 +106,7 @@ def test_a_page_is_written_and_never_over_something(
     assert run(["check", files[0], "-o", str(page), "--overwrite", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["page"] == str(page)
     assert run(["check", files[0], "-o", files[0], "--overwrite"]) == 2
-    assert run(["check", files[0], "-o", str(tmp_path / "page.pdf")]) == 2
+    assert run(["check", files[0], "-o", str(tmp_path / "page.txt")]) == 2
 
 
 def test_stretches() -> None:

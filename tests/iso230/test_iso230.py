@@ -184,5 +184,5 @@ def test_what_does_not_go_with_the_test_is_told(tmp_path: Path, capsys: pytest.C
 
 
 def test_a_page_has_the_name_of_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["iso230", str(tmp_path / "rest.csv"), "-o", str(tmp_path / "x.pdf")]) == 2
+    assert run(["iso230", str(tmp_path / "rest.csv"), "-o", str(tmp_path / "x.txt")]) == 2
     assert "name it" in capsys.readouterr().err

@@ -210,7 +210,7 @@ def test_the_command_and_python_write_the_same_page(
     assert run([*words, "-o", "model.html"]) in (0, 1)
     assert run([*words, "-o", "failing.csv", "--overwrite"]) == 2
     assert "is also an input" in " ".join(capsys.readouterr().err.split())
-    assert run([*words, "-o", "report.pdf"]) == 2
+    assert run([*words, "-o", "report.txt"]) == 2
     found = tc.assess("model.json", "failing.csv")
     assert found.report("again.html") == Path("again.html")
     assert Path("again.html").read_bytes() == first
