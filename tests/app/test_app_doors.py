@@ -59,7 +59,7 @@ def test_without_the_token_nothing_is_served(tmp_path: Path) -> None:
             answer = await client.get(path)
             assert (answer.status_code, TOKEN in answer.text) == (404, False)
         for method, path in found:
-            named = path.format(name="files/drift.csv", number=1)
+            named = path.format(name="files/drift.csv", number=1, other=1)
             for without in (
                 named.replace(TOKEN, "x"),
                 named.replace(f"/{TOKEN}", ""),
