@@ -50,15 +50,27 @@ def test_without_a_browser_nothing_is_computed(
     assert "install one, or write .html" in " ".join(capsys.readouterr().err.replace("│", "").split())
 
 
+WRITES = 'for a in "$@"; do case $a in --print-to-pdf=*) printf "%s" > "${a#--print-to-pdf=}";; esac; done\n'
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands for the browser")
-def test_a_browser_that_prints_nothing_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "work",
+    [
+        pytest.param("", id="nothing"),
+        pytest.param(WRITES % "%%PDF-1.4 half", id="half a file"),
+        pytest.param(f"{WRITES % '%%PDF-1.4 %%%%EOF'}kill -9 $$\n", id="killed"),
+        pytest.param(WRITES % "%%%%EOF", id="no PDF"),
+    ],
+)
+def test_a_browser_that_does_not_finish_is_reported(work: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fake = tmp_path / "browser"
-    fake.write_text("#!/bin/sh\necho first >&2\necho no display >&2\n")
+    fake.write_text(f"#!/bin/sh\necho first >&2\necho no display >&2\n{work}")
     fake.chmod(0o755)
     monkeypatch.setattr(browsers, "BROWSERS", (str(fake),))
     with pytest.raises(InputError, match=r"printed no PDF \(no display\)"):
         write_pdf(BIG.format(""), tmp_path / "x.pdf", overwrite=False)
-    assert not (tmp_path / "x.pdf").exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["browser"]
 
 
 def test_a_report_is_printed_under_the_name_of_a_pdf(tmp_path: Path) -> None:
