@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from thermocomp.app.runfolder import RunFolder
+from thermocomp.app.runfolder import LEARNED, RunFolder
 from thermocomp.app.store import NAME
 
 
@@ -47,13 +47,9 @@ def _differences(a: RunFolder, b: RunFolder) -> Iterator[str]:
             yield f"{key}: {_shown(one)}; then {_shown(two)}"
     if states[0]["version"] != states[1]["version"]:
         yield f"version of thermocomp: {states[0]['version']}; then {states[1]['version']}"
-    learned = [{k: v for k, v in s.items() if k.split(".")[0] in _LEARNED} for s in settings]
+    learned = [{k: v for k, v in s.items() if k.split(".")[0] in LEARNED} for s in settings]
     if learned[0] == learned[1] and states[0]["fingerprint"] != states[1]["fingerprint"]:
         yield "the content of a recording or of its mapping"
-
-
-#: tables that determine the models, see `thermocomp.app.project.Project.fingerprint`
-_LEARNED = ("recordings", "join", "compare", "limits", "fit")
 
 
 def _settings(folder: Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from thermocomp.api.plan import EVERY, plan
 from thermocomp.api.select import SelectionMethod, SelectionSettings
 from thermocomp.api.testprogram import Dialect
 from thermocomp.api.verbs import compare
+from thermocomp.app.runfolder import LEARNED
 from thermocomp.app.store import NAME, find_inside
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
@@ -254,7 +255,7 @@ class Project:
 
     def fingerprint(self) -> str:
         """Return the key of the comparison and the fitted models."""
-        return self.key_of(("recordings", "join", "compare", "limits", "fit"), self.settings.recordings)
+        return self.key_of(LEARNED, self.settings.recordings)
 
 
 def given(options: Any, leave: tuple[str, ...] = ()) -> dict[str, Any]:

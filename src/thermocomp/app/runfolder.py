@@ -20,6 +20,8 @@ State = Literal["running", "done", "stopped", "failed"]
 #: a running job writes its state at least this often; one silent for `SILENT` was killed [s]
 BEAT, SILENT = 2.0, 15.0
 _STOP = "stop"
+#: tables of the project file that determine the models, and with that the run
+LEARNED = ("recordings", "join", "compare", "limits", "fit")
 
 
 @dataclass(frozen=True, kw_only=True)

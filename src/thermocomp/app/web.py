@@ -21,7 +21,7 @@ from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
 from fastapi.staticfiles import StaticFiles
 from starlette.exceptions import HTTPException
 
-from thermocomp.app.comparing import read_json as _json
+from thermocomp.app.comparing import read_json
 from thermocomp.app.runfolder import runs_of
 from thermocomp.app.runviews import run_of, view_runs
 from thermocomp.app.store import LARGEST, Store, find_inside
@@ -157,7 +157,7 @@ def _results(store: Store) -> APIRouter:
     async def result(number: Annotated[int, InPath(ge=1, le=10**9)]) -> Json:
         folder = run_of(store.folder, number)
         names = ("check", "compare", "fit", "assess", "sensors", "plan")
-        found = {n: _json(folder.path / f"{n}.json") for n in names}
+        found = {n: read_json(folder.path / f"{n}.json") for n in names}
         return Json({**folder.read(), "results": found})
 
     @router.get("/runs/{number}/{name:path}")

@@ -99,7 +99,7 @@ class Draft:
         tables = self.document.get("columns")
         for name, table in [*tables.items()][::-1] if isinstance(tables, dict) else ():
             place = table.get("column", name) if isinstance(table, dict) else name
-            if isinstance(place, str | int):  # what is wrong otherwise is told where the mapping is read
+            if isinstance(place, str | int):  # other places are refused when the mapping is read
                 self._columns[place] = str(name)
 
     @property
