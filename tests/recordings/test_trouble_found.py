@@ -321,6 +321,14 @@ def test_single_sensors_of_another_logger_are_told(real: Recording) -> None:
     assert "the responses of t5_C come about 20 min before the changes of the spindle speed" in found.text
 
 
+@pytest.mark.parametrize("name", ["t_front_seat_C", "t_motor_C"])
+@pytest.mark.parametrize("minutes", [-40.0, -45.0, -50.0])
+def test_a_clock_that_is_off_by_more_than_is_tried_is_found(demo: Recording, name: str, minutes: float) -> None:
+    (found,) = [f for f in _trouble(_late(demo, [name], minutes)) if f.kind == "clock"]
+    assert found.channel == name
+    assert "before the changes of the spindle speed" in found.text
+
+
 def test_the_lag_of_heat_and_of_a_sensor_is_no_clock(demo: Recording) -> None:
     """Sensors far from the spindle; all of them behind a lag of 20 min; a clock that is 3 min off."""
     alpha = 1 - np.exp(-20 / 1200)

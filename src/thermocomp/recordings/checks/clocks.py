@@ -50,7 +50,7 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
     comes late. All temperatures, or all displacements, are tested jointly; trouble is reported if a shift of at least 8
     min and two rows improves the log-likelihood by over 60. Channels of an otherwise sound group are reported if they
     lead by as much; if they lag, only two or more together, each with a gain in log-likelihood of over 100, because a
-    remote sensor may respond late. Their shift has to be a maximum, not the end of the tested range.
+    remote sensor may respond late. At the end of the tested range, the gain must grow ever faster.
 
     No result is given for a test without a spindle speed channel or with fewer than two speed changes, for one shorter
     than 2 h 20 min, or for channels that do not respond to the spindle. In a test with a periodic speed the reported
@@ -151,10 +151,12 @@ def _disagree(group: Sequence[Signal], fits: _Fits) -> tuple[float, list[str]] |
         return float(fits.shifts[best]), [n for n, yes in zip(names, clear, strict=True) if yes]
     mine = fits.shifts[fits.gain.argmax(axis=0)]
     most = fits.gain.max(axis=0)
-    # a slow course of the day beside work at the same hours gains without a maximum inside the tested range
-    inside = np.abs(mine) < fits.shifts[-1]
-    early = inside & (mine <= -fits.least) & (most > _GAIN)
-    late = inside & (mine >= fits.least) & (most > _LATE)
+    # at the end of the tested range: a wrong clock gains ever more, a slow course of the day beside work at the same
+    # hours ever less
+    half = fits.gain[(len(fits.shifts) // 2 + fits.gain.argmax(axis=0)) // 2, np.arange(len(names))]
+    sharp = (np.abs(mine) < fits.shifts[-1]) | (most > 2.0 * half)
+    early = sharp & (mine <= -fits.least) & (most > _GAIN)
+    late = sharp & (mine >= fits.least) & (most > _LATE)
     for who in (early, late & (np.abs(mine - np.median(mine[late])) <= _NEAR / 2) if late.sum() > 1 else early):
         if who.any():
             return float(np.median(mine[who])), [n for n, yes in zip(names, who, strict=True) if yes]
