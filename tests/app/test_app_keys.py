@@ -83,7 +83,7 @@ def test_the_whole_way_by_keys(tmp_path: Path, width: int, scheme: str) -> None:
         page.wait_for_selector("#verdict table", timeout=300_000)
         keys.look("verdict")
         page.keyboard.press("Home")
-        keys.press("#tab-judge", "ArrowRight")
+        keys.press("#tab-judge", "ArrowRight", "ArrowRight")
         keys.press("#to", "s", "s")
         keys.press("#target .main")
         page.wait_for_selector("#package li a", timeout=120_000)
