@@ -10,4 +10,5 @@ def without_scripts(page: str) -> str:
     """Return a page without the curves' scripts as they are in the package, and without their data."""
     for name in ("uplot.min.js", "uplot.LICENSE", "curves.js"):
         page = page.replace((STATIC / name).read_text(encoding="utf-8").rstrip("\n"), "")
-    return re.sub(r"<script>\s*(/\*\s*\*/)?\s*</script>|<script type=\"application/json\">[^<>&]*</script>", "", page)
+    data = r'<script type="application/json"(?: id="words")?>[^<>&]*</script>'
+    return re.sub(rf"<script>\s*(/\*\s*\*/)?\s*</script>|{data}", "", page)

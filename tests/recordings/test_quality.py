@@ -150,7 +150,7 @@ def test_a_missing_value_code_is_trouble_and_nothing_else_is_said(code: float, r
 
     assert (found.severity, found.kind) == ("trouble", "missing-value code")
     assert f"are {code:g}, a value" in found.text
-    assert f"{len(rows)} value" in found.text
+    assert f"{len(rows)} of 2000 values" in found.text
     assert f"row {rows[0]} " in found.text
     assert f"missing = [{code:g}]" in found.text
 
@@ -220,7 +220,7 @@ def test_an_implausible_value_is_trouble_and_hides_nothing_else(quantity: str, v
     (found,) = _check(values, quantity)
 
     assert (found.severity, found.kind) == (severity, "implausible")
-    assert "2 values of 2000" in found.text
+    assert "2 of 2000 values" in found.text
     assert f"the most extreme {value:g} at row 300 (4500 s)" in found.text
     assert [f.kind for f in _check(stuck, quantity)] == ["implausible", "stuck"]
 
@@ -323,8 +323,8 @@ def test_a_few_rows_are_looked_at_without_failing(n: int) -> None:
     kinds = {(f.channel, f.kind) for f in check(short)}
 
     assert {("t2", "missing values"), ("t3", "missing-value code"), ("", "no cycle")} <= kinds
-    few = [(f.severity, f.text.split(",")[0]) for f in check(short) if f.kind == "short"]
-    assert few == ([("warning", f"has only {n} row{'s' * (n > 1)}")] if n < 10 else [])
+    few = [(f.severity, f.text.split(";")[0]) for f in check(short) if f.kind == "short"]
+    assert few == ([("warning", f"too few rows to assess ({n})")] if n < 10 else [])
     assert not {f for f in kinds if f[0] == "t1"}
 
 

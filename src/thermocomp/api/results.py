@@ -14,6 +14,7 @@ from thermocomp.api.base import Paged, Result, told_trouble
 from thermocomp.core.columns import Columns
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.explained import Explanations, explain_all
+from thermocomp.core.messages import join
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.faultlog import find_faults
@@ -155,7 +156,7 @@ class Compared(Result, Paged):
     def __str__(self) -> str:
         from thermocomp.report.summary import verdict
 
-        return " ".join([verdict(self.comparison), *told_trouble(self.trouble)])
+        return join([verdict(self.comparison), *told_trouble(self.trouble)], " ")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -138,6 +138,8 @@ class ProjectSettings:
     ----------
     name : str
         Name of the project, for its page.
+    language : {'en', 'de'}
+        Language of the page and the reports. Default: that of the browser, and of the environment.
     recordings : tuple of ProjectRecording
         Recordings to learn from.
     compare : CompareOptions
@@ -157,6 +159,7 @@ class ProjectSettings:
     """
 
     name: str = ""
+    language: Literal["", "en", "de"] = ""
     recordings: tuple[ProjectRecording, ...] = ()
     join: JoinOptions | None = None
     compare: CompareOptions = field(default_factory=CompareOptions)

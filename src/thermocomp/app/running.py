@@ -25,6 +25,7 @@ from thermocomp.export.target import find_target
 from thermocomp.export.verbs import export
 from thermocomp.files.draft import write_text
 from thermocomp.recordings.recording import Recording
+from thermocomp.report.language import translate, use_language
 
 #: minimum time between two writes of the progress [s]
 OFTEN = 0.5
@@ -129,7 +130,7 @@ class ProjectRun:
         KeyboardInterrupt
             The run was stopped.
         """
-        with self.folder.working():
+        with self.folder.working(), use_language(self.settings.language):
             if not self._has("fit"):
                 self._learn()
             if self.settings.export is not None:
@@ -243,7 +244,7 @@ class ProjectRun:
             writer(self.folder.path / name, overwrite=True)
         name = f"{self.folder.state.step}.json"
         write_text(as_text(found.to_dict()), self.folder.path / name, overwrite=True)
-        return [*(n for _, n in written), name], str(found)
+        return [*(n for _, n in written), name], translate(str(found))
 
     def _has(self, name: str, key: str = "") -> bool:
         return any((s.name, s.key) == (name, key) for s in self.folder.state.steps)

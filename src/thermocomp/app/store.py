@@ -52,6 +52,7 @@ class Store:
         if not (folder / NAME).exists():
             write_text(_NEW, folder / NAME, overwrite=False)
         self.editing, self.workers = asyncio.Lock(), Workers()
+        self.preferred = ""
         self._run: subprocess.Popen[bytes] | None = None
         self._said = 0
         self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
@@ -74,6 +75,10 @@ class Store:
     def content(self) -> dict[str, Any]:
         """Return the settings."""
         return self.document().unwrap()
+
+    def language(self) -> str:
+        """Return the language that was chosen, else that of the browser which opened the page."""
+        return str(self.content().get("language", "")) or self.preferred
 
     async def save(self, document: tomlkit.TOMLDocument) -> None:
         """Write settings after they have been validated.
@@ -136,8 +141,7 @@ class Store:
     async def adopt(self, name: str) -> dict[str, Any]:
         """Add a received file to the recordings, with a mapping that takes the best guesses, and return its preview."""
         path = find_inside(self.folder, name)
-        task = {"task": "preview", "file": str(path), "mapping": "", "guess": True, "answers": []}
-        found = await self.workers.ask(task)
+        found = await self._ask(path, "", guess=True)
         async with self.editing:
             document, table = self.document(), tomlkit.table()
             table["file"] = name
@@ -146,7 +150,7 @@ class Store:
                 table["mapping"] = f"{name}.toml"
             document.setdefault("recordings", tomlkit.aot()).append(table)
             self.replace(NAME, tomlkit.dumps(document))
-        self._read[name] = ((path.stat().st_mtime_ns, path.stat().st_size, found["mapping"]), found)
+        self._read[name] = (self._known(path, found["mapping"]), found)
         return found
 
     async def move(self, name: str, to: str = "") -> None:
@@ -203,12 +207,9 @@ class Store:
         path, mapping = find_inside(self.folder, name), str(table.get("mapping", ""))
         text = self._text(mapping)
         with suppress(OSError):
-            known = (path.stat().st_mtime_ns, path.stat().st_size, text)
+            known = self._known(path, text)
             if (found := self._read.get(name)) is None or found[0] != known:
-                asked = await self.workers.ask(
-                    {"task": "preview", "file": str(path), "mapping": text, "guess": False, "answers": []}
-                )
-                self._read[name] = found = (known, asked)
+                self._read[name] = found = (known, await self._ask(path, text))
             return found[1]
         raise InputError(f"{name}: the file cannot be read")
 
@@ -218,17 +219,24 @@ class Store:
             table = self.entry(document := self.document(), name)
             mapping = str(table.get("mapping", ""))
             path, text = find_inside(self.folder, name), self._text(mapping)
-            found = await self.workers.ask(
-                {"task": "preview", "file": str(path), "mapping": text, "guess": False, "answers": [*answers]}
-            )
+            found = await self._ask(path, text, answers)
             if found["mapping"] != text:
                 self.replace(wanted := mapping or f"{name}.toml", found["mapping"])
                 if not mapping:
                     table["mapping"] = wanted
                     self.replace(NAME, tomlkit.dumps(document))
-            known = (path.stat().st_mtime_ns, path.stat().st_size, found["mapping"])
-            self._read[name] = (known, found)
+            self._read[name] = (self._known(path, found["mapping"]), found)
             return found
+
+    async def _ask(
+        self, path: Path, mapping: str, answers: Sequence[Mapping[str, Any]] = (), *, guess: bool = False
+    ) -> dict[str, Any]:
+        task = {"task": "preview", "file": str(path), "mapping": mapping, "guess": guess, "answers": [*answers]}
+        return await self.workers.ask({**task, "language": self.language()})
+
+    def _known(self, path: Path, mapping: str) -> tuple[Any, ...]:
+        """Return what a preview depends on."""
+        return path.stat().st_mtime_ns, path.stat().st_size, mapping, self.language()
 
     # -- runs ----------------------------------------------------------------------------------------------------------
 

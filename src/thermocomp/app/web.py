@@ -9,11 +9,13 @@ import shlex
 import subprocess
 import time
 from collections.abc import AsyncIterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import jinja2
 import tomlkit
+from babel.core import negotiate_locale
 from fastapi import APIRouter, Body, FastAPI, Request
 from fastapi import Path as InPath
 from fastapi.exceptions import RequestValidationError
@@ -27,6 +29,7 @@ from thermocomp.app.runviews import run_of, view_runs
 from thermocomp.app.store import LARGEST, Store, find_inside
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.page.doors import Door, Json, declare_types
+from thermocomp.report.language import LANGUAGES, load_words, translate
 
 _HERE = Path(__file__).parent
 #: largest settings, and answers to questions about a file [bytes]
@@ -88,12 +91,17 @@ def _largest(request: Request) -> int:
 def _files(store: Store) -> APIRouter:
     """Return the routes of the page, the settings and the recordings."""
     router, loader = APIRouter(), jinja2.FileSystemLoader(_HERE / "templates")
-    template = jinja2.Environment(loader=loader, autoescape=True).get_template("app.html")
+    pages = jinja2.Environment(loader=loader, autoescape=True)
 
     @router.get("/", response_class=HTMLResponse)
-    async def show() -> HTMLResponse:
+    async def show(request: Request) -> HTMLResponse:
         store.workers.warm_up()
-        return HTMLResponse(template.render(folder=str(store.folder.resolve())))
+        store.preferred = _preferred(request.headers.get("accept-language", ""))
+        language = store.language()
+        words = load_words(language, "app/static/", "report/static/", "words")
+        template = pages.get_template("app.html", globals={"_": partial(translate, language=language)})
+        folder = str(store.folder.resolve())
+        return HTMLResponse(template.render(folder=folder, language=language, languages=LANGUAGES, words=words))
 
     @router.get("/api/project")
     async def tell() -> Json:
@@ -135,6 +143,12 @@ def _files(store: Store) -> APIRouter:
         return Json({"file": name, **await store.preview(name)})
 
     return router
+
+
+def _preferred(accepted: str) -> str:
+    """Return the language of the page that a browser prefers, from its header ``Accept-Language``."""
+    codes = [part.partition(";")[0].strip() for part in accepted.split(",")]
+    return negotiate_locale([c.replace("-", "_") for c in codes], [*LANGUAGES]) or "en"
 
 
 def _results(store: Store) -> APIRouter:

@@ -14,13 +14,16 @@ from tomlkit.exceptions import TOMLKitError
 from thermocomp.app.project import settings_of
 from thermocomp.app.store import NAME
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.quality import check
 from thermocomp.recordings.readers.columns import plan
 from thermocomp.recordings.readers.mapping import Mapping as ColumnMapping
 from thermocomp.recordings.readers.mending import Draft, located, mend, take_best, to_toml
 from thermocomp.recordings.readers.opening import open_table
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.recording import Recording
 from thermocomp.report import checks
+from thermocomp.report.language import translate, use_language
 
 #: first rows and columns shown, and points of a curve
 ROWS, COLUMNS, POINTS = 8, 200, 3000
@@ -65,7 +68,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
     ways = [located(f, recording, whole, table.headings) if f.remedy else {} for f in findings]
     return {
         "mapping": mended.text,
-        "summary": str(recording).removeprefix("<Recording ").removesuffix(">"),
+        "summary": translate(_summary(recording)),
         "columns": _columns(table, whole),
         "questions": [
             {"text": q.text, "severity": q.severity, "options": [_option(o, to_toml(o)) for o in q.options]}
@@ -73,7 +76,12 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
             if answer is None and q.severity in ("error", "column")
         ],
         "findings": [
-            {"severity": f.severity, "channel": f.channel, "text": f.text, **_option(way, to_toml(way) if way else "")}
+            {
+                "severity": f.severity,
+                "channel": f.channel,
+                "text": translate(f.text),
+                **_option(way, to_toml(way) if way else ""),
+            }
             for f, way in zip(findings, ways, strict=True)
         ],
         "notes": [*recording.notes, *recording.changed],
@@ -83,6 +91,19 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
         "origin_s": recording.origin,
         "panels": checks.panels(recording, findings, POINTS),
     }
+
+
+def _summary(r: Recording) -> Message:
+    return Message(
+        "{name}: {rows} rows, {hours:.1f} h, temperatures: {temperatures}, displacements: {displacements}, thermal "
+        "cycles: {cycles}",
+        name=r.name,
+        rows=len(r),
+        hours=float(r.time[-1]) / 3600,
+        temperatures=len(r.temperatures),
+        displacements=len(r.displacements),
+        cycles=len(r.cycles),
+    )
 
 
 def settings(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -142,7 +163,8 @@ def main() -> None:
         return
     given = json.loads(task)
     try:
-        found = _TASKS[given.pop("task")](**given)
+        with use_language(given.pop("language", "") or "en"):
+            found = _TASKS[given.pop("task")](**given)
     except InputError as e:
         found = {"refused": str(e)}
     sys.stdout.write(json.dumps(found, allow_nan=False))

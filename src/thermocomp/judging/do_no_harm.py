@@ -15,6 +15,7 @@ from scipy import stats
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.learned import Learned
+from thermocomp.core.messages import Message
 from thermocomp.core.provenance import Word, accepted
 from thermocomp.core.size import Size
 from thermocomp.judging.baselines import (
@@ -48,7 +49,7 @@ TIMES_NOISE, SHARE = 3.0, 0.05
 #: largest is less than this multiple of the smallest
 UNLIKE, SIZES = 0.6, 3.0
 #: reason against acceptance if the effects of noise and lost sensors were not tested
-UNTRIED = "the effects of noise and of a lost sensor were not tested: compare with robustness=True"
+UNTRIED = Message("the effects of noise and of a lost sensor were not tested: compare with robustness=True")
 #: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
 MOVES = 0.1
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from thermocomp.core.correction import uncompensated
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.recording import Recording
 
 #: tolerance of the deviation against residual minus correction, including rounding [um]
 ROUNDED = 0.5
 #: error message for a recording or a column whose state of compensation is unknown
-UNKNOWN = (
+UNKNOWN = Message(
     "compensation: unknown: the correction in force during the measurement is not known, so the uncompensated "
     "deviation is not known either; record with a controller that confirms its corrections and with its own "
     'temperature compensation off. If no correction was in force, set compensation = "off" in a mapping'

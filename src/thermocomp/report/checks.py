@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message, join
 from thermocomp.recordings.checks.findings import Finding
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import curves, records
 from thermocomp.report.drawing import BESIDE, add_legend, drawing, svg
 from thermocomp.report.figures import POINTS, line_style, shade_cycles, thin_points
 from thermocomp.report.html import page
+from thermocomp.report.language import translate
 from thermocomp.report.layout import Column, Layout
 
 #: panels by quantity from top to bottom, with their relative heights
@@ -58,7 +60,7 @@ def figure(recording: Recording, findings: Sequence[Finding], points: int = POIN
         panels = made.subplots(len(shown), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
         for ax, (quantity, channels) in zip(panels, shown.items(), strict=True):
             _panel(ax, recording, quantity, channels, numbers, points)
-        panels[-1].set_xlabel("time [h]")
+        panels[-1].set_xlabel(translate("time [h]"))
         panels[-1].margins(x=0)
         return made
 
@@ -123,7 +125,7 @@ def _panel(
     for hour, mine in labels.items():
         _label(ax, hour, mine)
     ax.set_ylabel(channels[0].unit)
-    ax.set_title(quantity.replace("_", " "))
+    ax.set_title(translate(quantity.replace("_", " ")))
     add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
 
 
@@ -177,15 +179,15 @@ def _label(ax: Axes, hour: float, found: Sequence[tuple[int, Finding]]) -> None:
 def _recording(r: Recording, found: Sequence[Finding], points: int) -> dict[str, Any]:
     kinds: dict[str, list[str]] = {}
     for number, f in enumerate(found, start=1):
-        kinds.setdefault(f.channel, []).append(f"{number} {f.kind}")
+        kinds.setdefault(f.channel, []).append(Message("{number} {kind}", number=number, kind=Message(f.kind)))
     told = records.recording(r, found)
     columns = (
         Column("channel", "name"),
-        Column("quantity", lambda c: c["quantity"].replace("_", " ")),
+        Column("quantity", lambda c: Message(c["quantity"].replace("_", " "))),
         Column("unit", "unit"),
         Column("place", "place"),
         *records.RANGE,
-        Column("found", lambda c: ", ".join(kinds.get(c["name"], []))),
+        Column("found", lambda c: join(kinds.get(c["name"], [""]), ", ")),
     )
     return {
         **told,

@@ -11,6 +11,7 @@ from thermocomp.core.shown import shorten
 from thermocomp.judging.results import Assessment
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.figures import COLOURS, POINTS, clock, thin_points
+from thermocomp.report.language import translate
 
 #: maximum number of points in all recordings of a page, and in each curve of a run: pages stay below 2.5 MB
 SHARE, RUN = 25_000, 2400
@@ -68,7 +69,7 @@ def channels(
         tone, dash = f"--c{k % len(COLOURS)}", k // len(COLOURS)
         curves.append(PageCurve(name=c.name, hours=x, values=y, tone=tone, dash=dash, shape=shape))
     cycles = [(float(hours[c.start]), float(hours[c.stop - 1]), c.name, "") for c in recording.cycles]
-    title = f"{quantity.replace('_', ' ')} [{shown[0].unit}]"
+    title = f"{translate(quantity.replace('_', ' '))} [{shown[0].unit}]"
     return _panel(title, [*curves, *more], cycles, limits, _LOW.get(quantity, 260))
 
 

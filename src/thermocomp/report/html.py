@@ -9,6 +9,7 @@ from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup
 
 from thermocomp import __version__
+from thermocomp.core.messages import Message
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import replace_unprintable
 from thermocomp.judging.choice import Choice
@@ -18,6 +19,14 @@ from thermocomp.recordings.samples import Samples
 from thermocomp.report import contributions, curves, declared, figures, selections
 from thermocomp.report.bands import describe_coverage
 from thermocomp.report.drawing import Drawn
+from thermocomp.report.language import (
+    find_language,
+    load_words,
+    translate,
+    write_cell,
+    write_date,
+    write_number,
+)
 from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
 
@@ -86,12 +95,28 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
 
 def page(template: str, **content: Any) -> str:
     """Return an HTML page rendered from a template, with the version of thermocomp."""
-    return environment().get_template(template).render(version=__version__, **content)
+    language = find_language()
+    words = load_words(language, "report/static/")
+    return environment().get_template(template).render(version=__version__, language=language, words=words, **content)
 
 
 def _shown(value: Any) -> Any:
-    """Return a value as shown on a page: text without unprintable or direction-changing characters."""
+    """Return a value as shown on a page: messages translated, no unprintable or direction-changing characters."""
+    if isinstance(value, Message):
+        value = translate(value)
     return replace_unprintable(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
+def say(text: str, **values: Any) -> str:
+    """Return a text of a page in its language, its line breaks as spaces.
+
+    Parameters
+    ----------
+    values : object
+        Values of its fields; without any, braces are characters like others.
+    """
+    text = " ".join(text.split())
+    return translate(Message(text, **values))
 
 
 def _embed(panels: Sequence[dict[str, Any]]) -> Markup:
@@ -110,9 +135,13 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    pages.filters["um"] = in_um
+    pages.globals["_"] = say
+    pages.filters["um"] = lambda value: write_number(in_um(value))
+    pages.filters["number"] = lambda value, digits=0: write_number(f"{value:.{digits}f}")
+    pages.filters["local"] = write_cell
+    pages.filters["date"] = write_date
     pages.filters["plus_minus"] = lambda *given: declared.plus_minus(*given).replace(" ", "\N{NO-BREAK SPACE}")
-    pages.filters["hours"] = lambda value: f"{value:.1f}"
+    pages.filters["hours"] = lambda value: write_number(f"{value:.1f}")
     pages.filters["laid_out"] = laid_out
     pages.filters["live"] = _embed
     pages.globals["static"] = lambda name: Markup((files(__package__) / "static" / name).read_text(encoding="utf-8"))

@@ -47,6 +47,8 @@ class Column:
         left-aligned; with ``>`` right-aligned.
     whole : bool
         Whether its cells are never wrapped.
+    named : bool
+        Whether the heading is a name, which no page translates.
     """
 
     heading: str
@@ -54,6 +56,7 @@ class Column:
     form: str = ""
     unit: str = ""
     whole: bool = False
+    named: bool = False
 
     def text(self, row: Any, *, page: bool = False) -> str:
         """Return the cell of a row as text; an unknown value is empty, or a dash among the numbers of a page."""
@@ -102,7 +105,10 @@ class Layout:
 
 def laid_out(t: Table) -> Layout:
     """Return the layout of a table of results, with its title above it."""
-    columns = [Column(heading, partial(_cell, j), "" if j in t.words else ">") for j, heading in enumerate(t.columns)]
+    columns = [
+        Column(heading, partial(_cell, j), "" if j in t.words else ">", named=True)
+        for j, heading in enumerate(t.columns)
+    ]
     return Layout(columns, t.rows, note=t.caption, tones={} if t.marked is None else {t.marked: "best"})
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.inuse import WEIGHTS
 from thermocomp.judging.results import Assessment, Comparison
@@ -71,6 +72,7 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
                 "kind": f.kind,
                 "channel": f.channel,
                 "text": f.text,
+                "message": _message(f.text),
                 "row": f.row,
                 "rows": None if f.rows is None else stretches(f.rows),
                 "remedy": None if f.remedy is None else dict(f.remedy),
@@ -79,6 +81,14 @@ def recording(r: Recording, found: Sequence[Finding]) -> dict[str, Any]:
         ],
         **declared.recording(r),
     }
+
+
+def _message(text: str) -> dict[str, Any] | None:
+    """Return template and values of a message, messages among the values likewise; None of other text."""
+    if not isinstance(text, Message):
+        return None
+    values = {k: _message(v) if isinstance(v, Message) else v for k, v in text.values.items()}
+    return {"template": text.template, "values": values}
 
 
 def remedy(content: Remedy) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from thermocomp.core.messages import Message, join
 from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage, do_no_harm
 from thermocomp.judging.choice import Table
@@ -66,21 +67,23 @@ def verdict(comparison: Comparison) -> str:
     left = [t for t in targets if t not in usable]
     if not usable:
         untried = any(do_no_harm.UNTRIED in a.verdict.caps for a in comparison.overall())
-        shown = "none was accepted on unseen cycles"
-        why = do_no_harm.UNTRIED if untried else shown
-        return f"No model may run yet for {_list(targets)}: {why}."
+        why = do_no_harm.UNTRIED if untried else Message("none was accepted on unseen cycles")
+        return Message("No model may run yet for {targets}: {reason}.", targets=_list(targets), reason=why)
     by_model: dict[str, list[str]] = {}
     for t, a in usable.items():
         by_model.setdefault(a.model, []).append(t)
-    who = "; ".join(f"{m} for {_list(t)}" for m, t in by_model.items())
-    with_, without = ([a.metric("rms") for a in usable.values()], [a.none_metric("rms") for a in usable.values()])
-    text = f"Use {who}: on unseen data, the RMS falls from {_span(without)} to {_span(with_)} um"
+    uses = [Message("{model} for {targets}", model=m, targets=_list(t)) for m, t in by_model.items()]
     limited = [t for t, a in usable.items() if a.word == "accepted for this duty"]
-    if limited:
-        text += f"; for this duty only ({_list(limited)}): the drift was much the same each time"
-    if left:
-        text += f"; no model passed for {_list(left)}"
-    return text + "."
+    return Message(
+        "Use {uses}: on unseen data, the RMS falls from {without} to {with_} um{duty}{left}.",
+        uses=join(uses, "; "),
+        without=_span([a.none_metric("rms") for a in usable.values()]),
+        with_=_span([a.metric("rms") for a in usable.values()]),
+        duty=Message("; for this duty only ({targets}): the drift was much the same each time", targets=_list(limited))
+        if limited
+        else "",
+        left=Message("; no model passed for {targets}", targets=_list(left)) if left else "",
+    )
 
 
 def describe_choice(comparison: Comparison, target: str) -> str:
@@ -232,9 +235,12 @@ def _recording(r: Recording) -> dict[str, Any]:
 
 
 def _list(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    if len(names) == 1:
+        return names[0]
+    return Message("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
 
 
-def _span(values: Sequence[float]) -> str:
+def _span(values: Sequence[float]) -> Message:
     low, high = min(values), max(values)
-    return f"{low:.1f}" if f"{low:.1f}" == f"{high:.1f}" else f"{low:.1f}-{high:.1f}"
+    same = f"{low:.1f}" == f"{high:.1f}"
+    return Message("{low:.1f}" if same else "{low:.1f}-{high:.1f}", low=low, high=high)

@@ -1,23 +1,23 @@
 "use strict";
 // The page of a project: it shows what the server tells, and asks it for everything that is done. make, css, show: curves.js
 const $ = id => document.getElementById(id);
-const KINDS = { temperature: "temperature", displacement: "deviation or displacement", spindle_speed: "spindle speed", position: "axis position", angle: "angle", feed: "feed", cycle: "label of cycles", ignore: "ignore" };
+const KINDS = { temperature: _("temperature"), displacement: _("deviation or displacement"), spindle_speed: _("spindle speed"), position: _("axis position"), angle: _("angle"), feed: _("feed"), cycle: _("label of cycles"), ignore: _("ignore") };
 const UNITS = { temperature: ["degC", "degF", "K"], displacement: ["um", "mm", "in", "nm"], spindle_speed: ["1/min", "Hz"], position: ["mm", "um", "in"], angle: ["urad", "deg"], feed: ["mm/min"] };
 const METHODS = ["ols", "partial-f", "mra", "dynamic", "averaged", "grouping", "subsets", "ace", "ace-monotone", "mlp", "ridge", "pcr", "pls", "lasso", "ppr"], USUAL = 5;
-const UNIT = { cycle: "thermal cycles", day: "days", file: "files" };
-const TARGETS = { c99: "C99 (DSP, PLC, computer)", st: "structured text, CODESYS", "st twincat": "structured text, TwinCAT", "st scl": "structured text, Siemens TIA", "st iec": "structured text, IEC 61131-3 second edition", siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", haas: "Haas", okuma: "Okuma", klipper: "Klipper", onnx: "ONNX" };
+const UNIT = { cycle: _("thermal cycles"), day: _("days"), file: _("files") };
+const TARGETS = { c99: _("C99 (DSP, PLC, computer)"), st: _("structured text, CODESYS"), "st twincat": _("structured text, TwinCAT"), "st scl": _("structured text, Siemens TIA"), "st iec": _("structured text, IEC 61131-3 second edition"), siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", haas: "Haas", okuma: "Okuma", klipper: "Klipper", onnx: "ONNX" };
 let state = null, seen = {}, drawn = 0, shownRun = "", figures = 0;
 
 function alarm(text = "") { $("alarm").textContent = text; $("alarm").hidden = !text; if (text) $("alarm").scrollIntoView({ block: "nearest" }); }
 function element(tag, text = "", kind = "", ...inner) { const e = make(tag, kind, text); e.append(...inner); return e; }
-function scrolling(inner) { const e = element("div", "", "scroll", inner); e.tabIndex = 0; e.setAttribute("role", "region"); e.setAttribute("aria-label", "table"); return e; }
+function scrolling(inner) { const e = element("div", "", "scroll", inner); e.tabIndex = 0; e.setAttribute("role", "region"); e.setAttribute("aria-label", _("table")); return e; }
 function button(text, run, kind = "") { const b = element("button", text, kind); b.type = "button"; b.addEventListener("click", run); return b; }
 async function api(path, method = "GET", body, raw = false) {
   alarm();
   const sent = body === undefined ? {} : raw ? { body } : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
   let answer;
-  try { answer = await fetch(path, { method, ...sent }); } catch { alarm("The page has lost its server: start thermocomp app again."); throw new Error("lost"); }
-  const content = await answer.json().catch(() => ({ detail: `the server answered ${answer.status}` }));
+  try { answer = await fetch(path, { method, ...sent }); } catch { alarm(_("The page has lost its server: start thermocomp app again.")); throw new Error("lost"); }
+  const content = await answer.json().catch(() => ({ detail: _("the server answered {status}", { status: answer.status }) }));
   if (!answer.ok) { alarm(typeof content.detail === "string" ? content.detail : JSON.stringify(content.detail)); throw new Error("refused"); }
   return content;
 }
@@ -28,14 +28,14 @@ const place = name => "api/recordings/" + name.split("/").map(encodeURIComponent
 
 const dropFiles = quietly(async files => {
   for (const file of files) {
-    $("busy").textContent = `Reading ${file.name} ...`;
+    $("busy").textContent = _("Reading {file} ...", { file: file.name });
     try { const found = await api(`api/drop/${encodeURIComponent(file.name)}`, "PUT", file, true); seen[found.file] = found; } finally { $("busy").textContent = ""; }
   }
   render(await api("api/project"));
 });
 
 const answer = quietly(async (name, remedies) => {
-  $("busy").textContent = `Reading ${name} again ...`;
+  $("busy").textContent = _("Reading {file} again ...", { file: name });
   try { seen[name] = await api(place(name), "POST", remedies); } finally { $("busy").textContent = ""; }
   draw(name);
 });
@@ -47,30 +47,30 @@ const useFile = quietly(async (name, to) => render(await api(`api/uses/${name.sp
 const undo = quietly(async name => { seen[name] = await api("api/undo/" + name.split("/").map(encodeURIComponent).join("/"), "POST"); draw(name); });
 
 function choices(name, options) {
-  return element("ul", "", "", ...options.map(o => element("li", "", "", button("use this", () => answer(name, [o.remedy])), " ", element("code", o.toml.replaceAll("\n", "; ")))));
+  return element("ul", "", "", ...options.map(o => element("li", "", "", button(_("use this"), () => answer(name, [o.remedy])), " ", element("code", o.toml.replaceAll("\n", "; ")))));
 }
 
 function draw(name) {  // the card of a recording
   const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
-  const remove = button("Remove", () => removeFile(name)); remove.title = "The file stays in the project's folder.";
+  const remove = button(_("Remove"), () => removeFile(name)); remove.title = _("The file stays in the project's folder.");
   const use = element("select"), assessed = (state.settings.assess || []).some(r => r.file === name);
-  use.append(new Option("learn from it", "recordings", false, !assessed), new Option("only assess the model on it", "assess", false, assessed));
-  use.addEventListener("change", () => useFile(name, use.value)); use.setAttribute("aria-label", `use of ${name}`);
+  use.append(new Option(_("learn from it"), "recordings", false, !assessed), new Option(_("only assess the model on it"), "assess", false, assessed));
+  use.addEventListener("change", () => useFile(name, use.value)); use.setAttribute("aria-label", _("use of {file}", { file: name }));
   card.replaceChildren(element("h2", name.replace(/^files\//, "") + " ", "", use, " ", remove));
-  if (!found) { card.append(element("p", "reading ...", "quiet")); return; }
-  const undoing = found.mapping ? button("Undo the last change", () => undo(name)) : "";
+  if (!found) { card.append(element("p", _("reading ..."), "quiet")); return; }
+  const undoing = found.mapping ? button(_("Undo the last change"), () => undo(name)) : "";
   if (found.error) {
-    card.append(element("p", found.error, "trouble"), found.options.length ? element("p", "Which of these is right?") : element("p", "This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading.", "quiet"), choices(name, found.options), undoing);
+    card.append(element("p", found.error, "trouble"), found.options.length ? element("p", _("Which of these is right?")) : element("p", _("This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading."), "quiet"), choices(name, found.options), undoing);
     return;
   }
   card.append(element("p", found.summary), scrolling(preview(name, found.columns)));
   for (const q of found.questions) card.append(element("p", q.text, "warning"), choices(name, q.options));
-  if (found.findings.length) card.append(element("h3", "Found in the data"), element("ol", "", "", ...found.findings.map(f => {
-    const line = element("li", "", f.severity, element("strong", f.severity + " "), `${f.channel} ${f.text} `);
-    if (f.toml) { const repair = button("repair", () => answer(name, [f.remedy])); repair.title = f.toml; line.append(repair); }
+  if (found.findings.length) card.append(element("h3", _("Found in the data")), element("ol", "", "", ...found.findings.map(f => {
+    const line = element("li", "", f.severity, element("strong", _(f.severity) + " "), `${f.channel} ${f.text} `);
+    if (f.toml) { const repair = button(_("repair"), () => answer(name, [f.remedy])); repair.title = f.toml; line.append(repair); }
     return line;
   })));
-  if (found.mapping) card.append(element("details", "", "", element("summary", "Mapping: what was changed in reading this file"), element("pre", found.mapping)), undoing);
+  if (found.mapping) card.append(element("details", "", "", element("summary", _("Mapping: what was changed in reading this file")), element("pre", found.mapping)), undoing);
   const figure = element("figure"), script = element("script", JSON.stringify(found.panels));
   script.type = "application/json"; figure.append(script); card.append(figure);
   const plots = found.panels.length ? show(figure, figures++) : [];
@@ -79,7 +79,7 @@ function draw(name) {  // the card of a recording
 }
 
 function preview(name, columns) {
-  const heads = columns.map(c => element("th", "", "", button(c.heading || `column ${c.number}`, () => changeColumn(name, c)), element("span", c.kind === "ignored" ? "ignored" : `${KINDS[c.kind] || c.kind}${c.unit ? ` [${c.unit}]` : ""}`, `kind ${c.kind}`)));
+  const heads = columns.map(c => element("th", "", "", button(c.heading || _("column {number}", { number: c.number }), () => changeColumn(name, c)), element("span", c.kind === "ignored" ? _("ignored") : `${KINDS[c.kind] || _(c.kind)}${c.unit ? ` [${c.unit}]` : ""}`, `kind ${c.kind}`)));
   const rows = [0, 1, 2, 3].map(k => element("tr", "", "", ...columns.map(c => element("td", c.cells[k] ?? "", "n"))));
   return element("table", "", "", element("thead", "", "", element("tr", "", "", ...heads)), element("tbody", "", "", ...rows));
 }
@@ -91,13 +91,13 @@ function changeColumn(name, c) {  // dialog: quantity, unit, sensitivity
   role.addEventListener("change", units); units();
   scale.type = "number"; scale.step = "any"; scale.value = c.scale;
   const close = () => box.close(), label = (text, e) => element("label", text + " ", "", e);
-  const save = button("Change", () => {
+  const save = button(_("Change"), () => {
     const channel = c.channel || c.heading.replace(/[^\p{L}\p{N}_-]+/gu, "_") || `column_${c.number}`, own = columnsOf(name).filter(o => o.heading === c.heading).length === 1;
     const said = role.value === "ignore" || role.value === "cycle" ? { role: role.value } : { role: role.value, unit: unit.value, scale: Number(scale.value) };
     close(); answer(name, [{ columns: { [channel]: { column: own ? c.heading : c.number, ...said } } }]);
   }, "main");
-  box.append(element("h2", c.heading || `column ${c.number}`), element("p", "", "", label("This column is", role), label("in", unit), label("number in the file times", scale)),
-    element("p", "A voltage needs its sensitivity: 25 um per volt is 25, in um.", "quiet"), element("p", "", "", save, " ", button("Cancel", close)));
+  box.append(element("h2", c.heading || _("column {number}", { number: c.number })), element("p", "", "", label(_("This column is"), role), label(_("in"), unit), label(_("number in the file times"), scale)),
+    element("p", _("A voltage needs its sensitivity: 25 um per volt is 25, in um."), "quiet"), element("p", "", "", save, " ", button(_("Cancel"), close)));
   box.addEventListener("close", () => box.remove());
   document.body.append(box); box.showModal();
 }
@@ -135,11 +135,12 @@ const chosen = id => [...document.querySelectorAll(`#${id} input:checked`)].map(
 const startRun = quietly(async event => {
   event.preventDefault();
   const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
-  if (!targets.length || !models.length) return alarm("Choose at least one deviation and one method.");
+  if (!targets.length || !models.length) return alarm(_("Choose at least one deviation and one method."));
   for (const [key, value, usual] of [["targets", targets, targets.length === all], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
-  await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null });
+  const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
+  await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
   await api(`api/runs?again=${$("again").checked}`, "POST");
-  $("again").checked = false; $("progress").textContent = "starting ...";
+  $("again").checked = false; $("progress").textContent = _("starting ...");
 });
 
 function minutes(s) { return s < 90 ? `${Math.max(1, Math.round(s))} s` : `${Math.round(s / 60)} min`; }
@@ -149,26 +150,27 @@ function progress(run) {
   $("stop").hidden = !running;
   if (state.trouble && !running && run?.state !== "failed") return box.replaceChildren(element("p", state.trouble, "failed"));
   if (!run) return box.replaceChildren();
-  if (!running) return box.replaceChildren(run.error ? element("p", `Run ${run.number} ${run.state}: ${run.error}`, run.state) : "");
+  if (!running) return box.replaceChildren(run.error ? element("p", _("Run {number} {state}: {error}", { number: run.number, state: _(run.state), error: run.error }), run.state) : "");
   const bar = element("progress"), spent = Date.now() / 1000 - run.step_began;
   if (run.total) { bar.max = run.total; bar.value = run.done; }
-  const left = run.done > 2 ? `, about ${minutes(spent / run.done * Math.max(run.total - run.done, 0))} left` : "";
-  bar.setAttribute("aria-label", "progress");
-  box.replaceChildren(element("p", `Run ${run.number}: ${run.step || "reading"}${run.total ? `, ${run.done} of ${run.total} tasks${left}` : ""}. ${run.task}`), bar);
+  const left = run.done > 2 ? _(", about {time} left", { time: minutes(spent / run.done * Math.max(run.total - run.done, 0)) }) : "";
+  bar.setAttribute("aria-label", _("progress"));
+  box.replaceChildren(element("p", _("Run {number}: {step}", { number: run.number, step: run.step || _("reading") }) + (run.total ? _(", {done} of {total} tasks", { done: run.done, total: run.total }) + left : "") + `. ${run.task}`), bar);
 }
 
-const um = v => v == null ? "–" : v.toFixed(2);
+const date = text => LANGUAGE === "en" ? text.replace("T", " ").slice(0, 16) : new Date(text).toLocaleString(LANGUAGE, { dateStyle: "medium", timeStyle: "short" });
+const um = v => v == null ? "–" : fixed(v, 2);
 const verdict = quietly(async run => {
   if (!run || shownRun === run.number + run.ended) return;
   shownRun = run.number + run.ended;
   const shown = (await api(`api/runs/${run.number}`)).results, { compare, fit } = shown, models = (fit || {}).models || [];
-  const head = ["deviation", "method", "verdict", "RMS with compensation [um]", "RMS without [um]", "why"];
+  const head = [_("deviation"), _("method"), _("verdict"), _("RMS with compensation [um]"), _("RMS without [um]"), _("why")];
   const method = target => [...((compare || {}).recommended || []).map(r => ({ ...r, model: r.written })), ...((compare || {}).results || [])].find(r => r.target === target && r.model);
   const line = m => [m.target, (method(m.target) || { model: m.family }).model, m.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason];
-  const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
-  $("verdict").replaceChildren(element("h2", `Result of run ${run.number}, on unseen data`),
+  const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", k === 2 ? _(String(c)) : String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
+  $("verdict").replaceChildren(element("h2", _("Result of run {number}, on unseen data", { number: run.number })),
     scrolling(element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
-    element("p", "", "", link(run, "comparison.html", "All methods, with curves and reasons"), " · ", link(run, "check.html", "Check of the data"), " · ", link(run, "model.json", "Model file")));
+    element("p", "", "", link(run, "comparison.html", _("All methods, with curves and reasons")), " · ", link(run, "check.html", _("Check of the data")), " · ", link(run, "model.json", _("Model file"))));
   deployForm(run);
   document.dispatchEvent(new CustomEvent("result", { detail: { run, results: shown } }));
 });
@@ -177,7 +179,7 @@ function link(run, name, text) { const a = element("a", text); a.href = `runs/${
 function runsTable(runs) {
   $("runs").tBodies[0].replaceChildren(...[...runs].reverse().map(r => {
     const files = r.steps.flatMap(s => s.files).filter(f => f.endsWith(".html")), said = r.steps.filter(s => s.name === "compare").map(s => s.text).join(" ");
-    return element("tr", "", "", element("td", String(r.number)), element("td", r.state, r.state), element("td", r.began.replace("T", " ").slice(0, 16)), element("td", r.error || said), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
+    return element("tr", "", "", element("td", String(r.number)), element("td", _(r.state), r.state), element("td", date(r.began)), element("td", r.error || said), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
   }));
   $("command").textContent = state.command;
 }
@@ -187,8 +189,8 @@ function runsTable(runs) {
 function deployForm(run) {
   if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
   const steps = run.steps.filter(s => s.name === "export");
-  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s.files.length ? s.files[0].split("/")[0] : "nothing exported"), element("p", s.text), element("ul", "", "", ...s.files.map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
-  if (!steps.length) $("package").append(element("p", "Nothing is exported yet.", "quiet"));
+  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s.files.length ? s.files[0].split("/")[0] : _("nothing exported")), element("p", s.text), element("ul", "", "", ...s.files.map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
+  if (!steps.length) $("package").append(element("p", _("Nothing is exported yet."), "quiet"));
 }
 
 const exportModels = quietly(async event => {
@@ -196,7 +198,7 @@ const exportModels = quietly(async event => {
   const [to, dialect] = $("to").value.split(" ");
   await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
   await api("api/runs", "POST");
-  $("package").replaceChildren(element("p", "exporting ...", "quiet"));
+  $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
 });
 
 // -- the page ----------------------------------------------------------------------------------------------------------
@@ -228,6 +230,7 @@ for (const kind of ["dragover", "dragleave", "drop"]) $("drop").addEventListener
 $("join").addEventListener("change", quietly(e => api("api/settings", "PUT", { join: e.target.checked ? {} : null })));
 $("to-judge").addEventListener("click", () => open($("tab-judge")));
 $("settings").addEventListener("submit", startRun);
+$("language").addEventListener("change", quietly(async e => { await api("api/settings", "PUT", { language: e.target.value }); location.reload(); }));
 $("target").addEventListener("submit", exportModels);
 $("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs[state.runs.length - 1].number}`, "DELETE")));
 $("name").addEventListener("change", quietly(e => api("api/settings", "PUT", { name: e.target.value })));
@@ -235,6 +238,6 @@ addEventListener("DOMContentLoaded", () => {  // when the other scripts listen
   api("api/project").then(render).catch(() => 0);
   const events = new EventSource("api/events");
   events.addEventListener("message", e => render(JSON.parse(e.data)));
-  events.addEventListener("error", () => alarm("The page has lost its server; it tries again. What is running goes on."));
+  events.addEventListener("error", () => alarm(_("The page has lost its server; it tries again. What is running goes on.")));
   events.addEventListener("open", () => alarm());
 });

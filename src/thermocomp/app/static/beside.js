@@ -19,14 +19,14 @@
     fill($("run-b"), runs, runs.length && runs[runs.length - 1].number);
   }));
 
-  const cells = one => one ? [one.rms_um, one.worst ? `${um(one.worst[0])} in ${one.worst[1]}` : "–", element("span", one.verdict + (one.written ? " (used)" : ""), one.verdict.split(" ")[0])] : ["–", "–", "not compared"];
+  const cells = one => one ? [one.rms_um, one.worst ? _("{value} in {cycle}", { value: um(one.worst[0]), cycle: one.worst[1] }) : "–", element("span", _(one.verdict) + (one.written ? ` (${_("used")})` : ""), one.verdict.split(" ")[0])] : ["–", "–", _("not compared")];
   $("beside").addEventListener("submit", quietly(async event => {
     event.preventDefault();
     const [a, b] = [$("run-a").value, $("run-b").value];
-    if (!a || !b) return alarm("Choose two runs.");
+    if (!a || !b) return alarm(_("Choose two runs."));
     const { rows, differences } = await api(`api/runs/${a}/beside/${b}?${new URLSearchParams({ project: other() })}`);
-    const names = [`run ${b}${other() ? " there" : ""}`, `run ${a}`], head = ["deviation", "method", ...names.flatMap(n => [`RMS [um], ${n}`, `worst cycle [um], ${n}`, `verdict, ${n}`])];
-    $("compared").replaceChildren(element("h3", `From ${names[0]} to ${names[1]}`), differences.length ? element("ul", "", "", ...differences.map(d => element("li", d))) : element("p", "The choices are the same."),
+    const names = [other() ? _("run {number} there", { number: b }) : _("run {number}", { number: b }), _("run {number}", { number: a })], head = [_("deviation"), _("method"), ...names.flatMap(n => [`RMS [um], ${n}`, `${_("worst cycle [um]")}, ${n}`, `${_("verdict")}, ${n}`])];
+    $("compared").replaceChildren(element("h3", _("From {first} to {second}", { first: names[0], second: names[1] })), differences.length ? element("ul", "", "", ...differences.map(d => element("li", d))) : element("p", _("The choices are the same.")),
       table(head, rows.map(r => [r.target, r.model, ...cells(r.of[0]), ...cells(r.of[1])])));
   }));
 }

@@ -31,18 +31,18 @@
     const starts = found.cycles.map(c => c.start_s), keep = list => save(name, list.map(s => s + found.origin_s)), end = plots[0].data[0][plots[0].data[0].length - 1] * 3600;
     const rows = found.cycles.map((c, k) => {
       const start = element("input"), until = k + 1 < starts.length ? starts[k + 1] : end, others = starts.filter((_, n) => n && n !== k);
-      start.type = "number"; start.step = "any"; start.value = (c.start_s / 3600).toFixed(4); start.disabled = !k; start.setAttribute("aria-label", `start of cycle ${c.name} [h]`);
+      start.type = "number"; start.step = "any"; start.value = (c.start_s / 3600).toFixed(4); start.disabled = !k; start.setAttribute("aria-label", _("start of cycle {cycle} [h]", { cycle: c.name }));
       start.addEventListener("change", () => keep([...others, start.valueAsNumber * 3600]));
-      const merge = button("merge with the one before", () => keep(others)), split = button("split", () => {
+      const merge = button(_("merge with the one before"), () => keep(others)), split = button(_("split"), () => {
         const at = plots[0].cursor.left >= 0 ? plots[0].posToVal(plots[0].cursor.left, "x") * 3600 : -1;  // at the cursor of the curves, else in the middle
         keep([...starts.slice(1), at > c.start_s && at < until ? at : (c.start_s + until) / 2]);
       });
-      merge.setAttribute("aria-label", `merge cycle ${c.name} with the one before`); split.setAttribute("aria-label", `split cycle ${c.name}`);
+      merge.setAttribute("aria-label", _("merge cycle {cycle} with the one before", { cycle: c.name })); split.setAttribute("aria-label", _("split cycle {cycle}", { cycle: c.name }));
       return [c.name, start, k ? merge : "", split];
     });
-    const found_again = button("Find the cycles again", () => answer(name, [{ cycles: { starts: [] } }]));
-    return element("details", "", "cycles", element("summary", `Thermal cycles: ${found.cycles.length}`), element("p", "Drag a border on the curves, or state the start of a cycle; a cycle is split at the cursor of the curves, or in the middle.", "quiet"),
-      table(["cycle", "start [h]", "", ""], rows), found_again);
+    const found_again = button(_("Find the cycles again"), () => answer(name, [{ cycles: { starts: [] } }]));
+    return element("details", "", "cycles", element("summary", _("Thermal cycles: {n}", { n: found.cycles.length })), element("p", _("Drag a border on the curves, or state the start of a cycle; a cycle is split at the cursor of the curves, or in the middle."), "quiet"),
+      table([_("cycle"), _("start [h]"), "", ""], rows), found_again);
   }
 
   document.addEventListener("card", e => {

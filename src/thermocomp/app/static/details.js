@@ -16,20 +16,20 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
 
   function methodRow(run, r, written) {
     const worst = most(r.units.map(u => [u.name, u.rms_um])), robust = r.robustness, lost = robust && most(Object.entries(robust.lost_sensor_rms_um));
-    const noise = robust && robust.noise_rms_um.normal, curves = button("curves", quietly(() => plot(run, r)));
-    curves.setAttribute("aria-label", `curves of ${r.model} for ${r.target}`);
-    return [r.target, r.model + (written ? " (used)" : ""), element("span", r.verdict, r.verdict.split(" ")[0]), r.rms_um, r.none_rms_um, worst ? `${um(worst[1])} in ${worst[0]}` : "–",
-      r.half_width_um == null ? "–" : `± ${um(r.half_width_um)}, ${r.coverage_pct.toFixed(0)} % inside`, noise ? `${um(noise.mean)} with ${robust.noise_degC} degC` : "–", lost ? `${um(lost[1])} without ${lost[0]}` : "–", String(r.n_sensors), r.rms_um == null ? r.reason : curves];
+    const noise = robust && robust.noise_rms_um.normal, curves = button(_("curves"), quietly(() => plot(run, r)));
+    curves.setAttribute("aria-label", _("curves of {model} for {target}", { model: r.model, target: r.target }));
+    return [r.target, r.model + (written ? ` (${_("used")})` : ""), element("span", _(r.verdict), r.verdict.split(" ")[0]), r.rms_um, r.none_rms_um, worst ? _("{value} in {cycle}", { value: um(worst[1]), cycle: worst[0] }) : "–",
+      r.half_width_um == null ? "–" : _("± {width}, {share} % inside", { width: um(r.half_width_um), share: r.coverage_pct.toFixed(0) }), noise ? _("{value} with {noise} degC", { value: um(noise.mean), noise: robust.noise_degC.toLocaleString(LANGUAGE) }) : "–", lost ? _("{value} without {sensor}", { value: um(lost[1]), sensor: lost[0] }) : "–", String(r.n_sensors), r.rms_um == null ? r.reason : curves];
   }
 
   async function plot(run, r) {  // measured, predicted, residual; a button for each cycle
     const asked = new URLSearchParams({ target: r.target, model: r.model }), panels = await api(`api/runs/${run.number}/curves?${asked}`);
-    const figure = element("figure"), script = element("script", JSON.stringify(panels)), box = $("curves"), cycles = element("p", "Cycle: ", "zoom");
+    const figure = element("figure"), script = element("script", JSON.stringify(panels)), box = $("curves"), cycles = element("p", _("Cycle:") + " ", "zoom");
     script.type = "application/json"; figure.append(script);
-    box.replaceChildren(element("h3", `${r.model} for ${r.target}, on unseen data`), cycles, figure);
+    box.replaceChildren(element("h3", _("{model} for {target}, on unseen data", { model: r.model, target: r.target })), cycles, figure);
     const plots = show(figure, plotted++);
     for (const [from, to, name, told] of panels[0].cycles) {
-      const zoomTo = button(name || "rows", () => { for (const u of plots) u.setScale("x", { min: from, max: to }); $("cycle").textContent = [name, told].filter(Boolean).join(": "); });
+      const zoomTo = button(name || _("rows"), () => { for (const u of plots) u.setScale("x", { min: from, max: to }); $("cycle").textContent = [name, told].filter(Boolean).join(": "); });
       cycles.append(zoomTo, " ");
     }
     const said = element("span", "", "soft"); said.id = "cycle"; said.setAttribute("role", "status"); cycles.append(said);
@@ -39,7 +39,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
   function scatter(title, what, unit, points) {  // number of sensors against error; a point shows its set
     const W = 440, H = 250, L = 52, B = 40, xs = points.map(p => p.sensors.length), top = Math.max(...points.map(p => p.error)) * 1.08 || 1, last = Math.max(...xs);
     const names = [...new Set(points.map(p => p.model))], svg = shape("svg", { viewBox: `0 0 ${W} ${H}`, class: "scatter", role: "group", "aria-label": title });
-    const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", "A click on a point shows its sensors.", "quiet");
+    const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", _("A click on a point shows its sensors."), "quiet");
     said.setAttribute("role", "status");
     for (const part of [0, 0.25, 0.5, 0.75, 1]) svg.append(shape("line", { x1: L, x2: W - 8, y1: y(part * top), y2: y(part * top), class: "grid" }), shape("text", { x: L - 6, y: y(part * top) + 4, "text-anchor": "end" }, (part * top).toPrecision(2)));
     for (let n = 1; n <= last; n += Math.ceil(last / 12)) svg.append(shape("text", { x: x(n), y: H - B + 28, "text-anchor": "middle" }, String(n)));
@@ -48,7 +48,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
       const dot = shape("circle", { cx: x(p.sensors.length) + 7 * (names.indexOf(p.model) - (names.length - 1) / 2) * Math.min(1, 6 / names.length), cy: y(p.error), r: 6, tabindex: 0, role: "button", "aria-pressed": "false", "aria-label": `${p.model}, ${p.sensors.length} ${what}: ${um(p.error)} ${unit}`, style: `fill: var(--c${names.indexOf(p.model) % 6})` });
       const choose = () => {
         for (const other of svg.querySelectorAll("circle")) other.setAttribute("aria-pressed", other === dot);
-        said.textContent = `${p.model} with ${p.sensors.length}: ${um(p.error)} ${unit}. ${p.sensors.join(", ") || "no sensor"}`;
+        said.textContent = `${p.model} (${p.sensors.length}): ${um(p.error)} ${unit}. ${p.sensors.join(", ") || _("no sensor")}`;
       };
       dot.addEventListener("click", choose);
       dot.addEventListener("keydown", e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); choose(); } });
@@ -62,18 +62,18 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const own = overall(results.compare).filter(r => r.rms_um != null), chosen = ((results.sensors || {}).choices || []), box = element("div", "", "charts");
     for (const c of chosen) {
       const points = c.points.filter(p => p.error != null);
-      if (points.length) box.append(scatter(`Smallest sets of temperatures: ${c.target}`, "temperature sensors", c.unit, points));
+      if (points.length) box.append(scatter(_("Smallest sets of temperatures: {target}", { target: c.target }), _("temperature sensors"), c.unit, points));
     }
-    for (const target of new Set(own.map(r => r.target))) box.append(scatter(`Methods compared, all inputs: ${target}`, "inputs", "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, error: r.rms_um }))));
-    const ask = button("Find the smallest sufficient set of sensors", quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
-    return [element("h3", "Number of sensors against error on unseen data"), ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
+    for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, error: r.rms_um }))));
+    const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
+    return [element("h3", _("Number of sensors against error on unseen data")), ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
   }
 
   document.addEventListener("result", e => {
     const { run, results } = e.detail, used = new Set(((results.compare || {}).recommended || []).map(r => JSON.stringify([r.target, r.written])));
-    const head = ["deviation", "method", "verdict", "RMS [um]", "without [um]", "worst cycle [um]", "band [um]", "with noise [um]", "sensor lost [um]", "inputs", ""], kept = element("div");
+    const head = [_("deviation"), _("method"), _("verdict"), "RMS [um]", _("without [um]"), _("worst cycle [um]"), _("band [um]"), _("with noise [um]"), _("sensor lost [um]"), _("inputs"), ""], kept = element("div");
     kept.id = "curves";
     const rows = overall(results.compare).map(r => methodRow(run, r, used.has(JSON.stringify([r.target, r.model]))));
-    $("details").replaceChildren(element("h3", "All methods, RMS on unseen data"), table(head, rows), kept, ...sensors(results));
+    $("details").replaceChildren(element("h3", _("All methods, RMS on unseen data")), table(head, rows), kept, ...sensors(results));
   });
 }

@@ -23,18 +23,18 @@
     }
     await api("api/settings", "PUT", { plan });
     await api("api/runs", "POST");
-    $("planned").replaceChildren(element("p", "Planning; the progress is shown in step 2 ...", "quiet"));
+    $("planned").replaceChildren(element("p", _("Planning; the progress is shown in step 2 ..."), "quiet"));
   }));
 
   document.addEventListener("result", e => {
     const { run, results } = e.detail, steps = run.steps.filter(s => s.name === "plan"), step = steps[steps.length - 1];
-    const range = c => `${um(c.gain_um)} (${um(c.gain_range_um[0])} to ${um(c.gain_range_um[1])})`;
+    const range = c => _("{value} ({low} to {high})", { value: um(c.gain_um), low: um(c.gain_range_um[0]), high: um(c.gain_range_um[1]) });
     if (step && results.plan) {
       const links = step.files.filter(f => !f.endsWith(".json")).flatMap(f => [link(run, f, f.split("/")[1]), " · "]).slice(0, -1);
       for (const a of links) if (a.href && !a.href.endsWith(".png")) a.download = a.textContent;
-      $("planned").replaceChildren(element("h2", "The next test"), element("p", step.text), element("p", "NC program, measurement sheet and figure: ", "", ...links),
-        element("h3", "Tests considered"), table(["test", "expected gain [um]", "new"], results.plan.candidates.map(c => [c.words, range(c), c.news])));
-    } else $("planned").replaceChildren(element("p", "Nothing is planned yet.", "quiet"));
+      $("planned").replaceChildren(element("h2", _("The next test")), element("p", step.text), element("p", _("NC program, measurement sheet and figure:") + " ", "", ...links),
+        element("h3", _("Tests considered")), table([_("test"), _("expected gain [um]"), _("new")], results.plan.candidates.map(c => [c.words, range(c), c.news])));
+    } else $("planned").replaceChildren(element("p", _("Nothing is planned yet."), "quiet"));
     if (run.state === "failed") $("planned").prepend(element("p", run.error, "trouble"));
     live(run);
   });
@@ -44,15 +44,15 @@
     if (!fitted) return box.replaceChildren();
     const now = await api("api/live"), file = link(run, "live.toml", "live.toml");
     file.download = "live.toml";
-    const said = element("p", "", "", now.address ? `Run ${now.run} is tried at ` : "");
+    const said = element("p", "", "", now.address ? _("Run {number} is tried at", { number: now.run }) + " " : "");
     said.setAttribute("role", "status");
     if (now.address) { const page = element("a", now.address); page.href = now.address; page.target = "_blank"; page.rel = "noreferrer"; said.append(page); }
-    const start = button("Try it live", quietly(async () => {
-      said.textContent = "The live page starts ..."; start.disabled = true;
+    const start = button(_("Try it live"), quietly(async () => {
+      said.textContent = _("The live page starts ..."); start.disabled = true;
       try { await api(`api/live/${run.number}`, "POST"); } finally { live(run); }
     }));
-    const stop = button("End the trial", quietly(async () => { await api("api/live", "DELETE"); live(run); }));
-    box.replaceChildren(element("h2", "Live"), element("p", "Configuration of thermocomp serve for these models, to be edited for the machine: ", "", file),
-      element("p", "The live page in shadow, with the recording replayed 60 times faster: ", "", now.address ? stop : start), said);
+    const stop = button(_("End the trial"), quietly(async () => { await api("api/live", "DELETE"); live(run); }));
+    box.replaceChildren(element("h2", _("Live")), element("p", _("Configuration of thermocomp serve for these models, to be edited for the machine:") + " ", "", file),
+      element("p", _("The live page in shadow, with the recording replayed 60 times faster:") + " ", "", now.address ? stop : start), said);
   });
 }

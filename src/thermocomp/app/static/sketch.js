@@ -20,7 +20,7 @@
     const free = !places[name], [x, y] = free ? [18 + 70 * (k % 4), H + 14 + 16 * (Math.floor(k / 4) % 2)] : [places[name][0] * W, places[name][1] * H];
     g.setAttribute("transform", `translate(${x} ${y})`);
     g.classList.toggle("free", free);
-    g.setAttribute("aria-label", free ? `${name}, not placed` : `${name}, ${Math.round(100 * places[name][0])} % from the left, ${Math.round(100 * places[name][1])} % from the top`);
+    g.setAttribute("aria-label", free ? _("{name}, not placed", { name }) : _("{name}, {x} % from the left, {y} % from the top", { name, x: Math.round(100 * places[name][0]), y: Math.round(100 * places[name][1]) }));
   }
 
   function sensor(name, k) {

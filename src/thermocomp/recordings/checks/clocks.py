@@ -7,6 +7,7 @@ import numpy as np
 
 from thermocomp.core import lagbank
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.findings import Finding, Signal
 
 #: time constants of the thermal response to the spindle [s]
@@ -81,16 +82,11 @@ def clocks(signals: Sequence[Signal], time: FloatArray, speed: FloatArray | None
         groups = {"channel": everyone}
     for quantity, (shift, names) in told.items():
         others = len(groups[quantity]) - len(names)
-        who = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-        rest = (
-            f"; the other {others} {quantity}s show no clear response: shift those of the same logger by the same time"
-            * (others > 0)
-        )
         moved: dict[str, object] = {"do": "shift", "channels": names, "by_s": -shift}
         if others:  # only the user knows which logger recorded these channels
             moved["reason"] = "clock; add the other channels of this logger"
         channel = names[0] if len(names) == 1 else ""
-        yield Finding("trouble", channel, "clock", _text(who, shift) + rest, remedy={"clean": [moved]})
+        yield Finding("trouble", channel, "clock", _text(names, shift, others), remedy={"clean": [moved]})
 
 
 def _usable(signals: Sequence[Signal], quantity: str) -> list[Signal]:
@@ -163,12 +159,30 @@ def _disagree(group: Sequence[Signal], fits: _Fits) -> tuple[float, list[str]] |
     return None
 
 
-def _text(who: str, shift: float) -> str:
-    minutes = abs(shift) / 60
-    way, remedy = ("before", "later") if shift < 0 else ("after", "earlier")
-    cannot = "before its cause" if shift < 0 else "so late and yet so sharply"
-    return (
-        f"the clocks of two loggers differ: the responses of {who} come about {minutes:.0f} min {way} the changes of "
-        f"the spindle speed, but heat cannot act {cannot}; shift these columns {minutes:.0f} min {remedy}, or shift "
-        "the spindle speed by as much in the other direction"
+def _text(names: Sequence[str], shift: float, others: int) -> Message:
+    who = ", ".join(names[:6])
+    if len(names) > 6:
+        who = Message("{names} and {n} more", names=who, n=len(names) - 6)
+    rest = (
+        Message(
+            "; the other {n} channels of this kind show no clear response: shift those of the same logger by the same "
+            "time",
+            n=others,
+        )
+        if others
+        else ""
+    )
+    given = {"who": who, "minutes": abs(shift) / 60, "rest": rest}
+    if shift < 0:
+        return Message(
+            "the clocks of two loggers differ: the responses of {who} come about {minutes:.0f} min before the changes "
+            "of the spindle speed, but heat cannot act before its cause; shift these columns {minutes:.0f} min later, "
+            "or shift the spindle speed by as much in the other direction{rest}",
+            **given,
+        )
+    return Message(
+        "the clocks of two loggers differ: the responses of {who} come about {minutes:.0f} min after the changes of "
+        "the spindle speed, but heat cannot act so late and yet so sharply; shift these columns {minutes:.0f} min "
+        "earlier, or shift the spindle speed by as much in the other direction{rest}",
+        **given,
     )

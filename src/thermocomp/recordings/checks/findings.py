@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import Remedy
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message
 
 Severity = Literal["trouble", "warning", "info"]
 SEVERITIES: tuple[Severity, ...] = ("trouble", "warning", "info")
@@ -29,7 +30,8 @@ class Finding:
     kind : str
         Kind of finding, such as ``gap`` or ``stuck``.
     text : str
-        One sentence: location, size, and action. Rows are counted from 0, as in the table of the recording.
+        One sentence: location, size, and action. Rows are counted from 0, as in the table of the recording. Usually a
+        `Message`, whose template and values a program or another language can use.
     rows : ndarray of int, optional
         Rows concerned, if the others are valid; None if the finding concerns the whole channel or recording.
     row : int, optional
@@ -137,14 +139,9 @@ def column(name: str, **keys: object) -> Remedy:
     return {"columns": {name: keys}}
 
 
-def at_row(row: int, time: FloatArray) -> str:
+def at_row(row: int, time: FloatArray) -> Message:
     """Return a row as text: its number and its time [s]."""
-    return f"row {row} ({time[row]:.10g} s)"
-
-
-def count(n: int, what: str) -> str:
-    """Return a number and a noun in singular or plural, such as ``3 rows``."""
-    return f"{n} {what}{'' if n == 1 else 's'}"
+    return Message("row {row} ({time:.10g} s)", row=row, time=float(time[row]))
 
 
 def speed_changes(speed: FloatArray | None, n: int) -> BoolArray:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.findings import Finding, Signal, at_row, cut_out
 
 #: smallest step that is reported, by quantity [degC, um, urad]
@@ -155,16 +156,23 @@ def _step(mine: Edges, lone: list[int], time: FloatArray) -> Finding:
     if len(lone) == 2 and back:
         first, last = (int(r) for r in sorted([row, int(mine.after[back[0]])]))
         up = float(mine.height[min(lone)])
-        text = (
-            f"is off by {up:+.3g} {channel.unit} from {at_row(first, time)} to {at_row(last - 1, time)}, by a step "
-            "that is reversed later and that no other channel shows: delete these values"
+        text = Message(
+            "is off by {step:+.3g} {unit} from {first} to {last}, by a step that is reversed later and that no other "
+            "channel shows: delete these values",
+            step=up,
+            unit=channel.unit,
+            first=at_row(first, time),
+            last=at_row(last - 1, time),
         )
         return cut_out("trouble", channel, "step", text, np.arange(first - 1, last), time)
-    more = f", the largest of {len(lone)} such steps" if len(lone) > 1 else ""
-    text = (
-        f"steps by {height:+.3g} {channel.unit} at {at_row(row, time)}{more}, which no other channel shows: a sensor "
-        "or probe that was touched or came loose. Split the test there into two files, each with its own zero "
-        "(reference reading), subtract the step from the values after it, or leave the channel out"
+    text = Message(
+        "steps by {step:+.3g} {unit} at {row}{more}, which no other channel shows: a sensor or probe that was touched "
+        "or came loose. Split the test there into two files, each with its own zero (reference reading), subtract the "
+        "step from the values after it, or leave the channel out",
+        step=height,
+        unit=channel.unit,
+        row=at_row(row, time),
+        more=Message(", the largest of {n} such steps", n=len(lone)) if len(lone) > 1 else "",
     )
     begin, times = min(int(mine.after[j]) for j in lone), sorted(float(time[mine.after[j]]) for j in lone)
     # of a temperature the values after it are left out; what a displacement was relative to before is not known either
@@ -189,9 +197,11 @@ def _exchanged(a: Edges, b: Edges, row: int, height: float, moved: BoolArray) ->
 
 
 def _swap(a: Signal, b: Signal, row: int, time: FloatArray) -> Finding:
-    text = (
-        f"is exchanged with {b.channel.name} at {at_row(row, time)}: each continues at the level of the other. Swap "
-        "these columns back from there on, or leave both out"
+    text = Message(
+        "is exchanged with {other} at {row}: each continues at the level of the other. Swap these columns back from "
+        "there on, or leave both out",
+        other=b.channel.name,
+        row=at_row(row, time),
     )
     names = sorted([a.channel.name, b.channel.name])  # both report the same step
     back = {"do": "swap", "channels": names, "at": float(time[row])}

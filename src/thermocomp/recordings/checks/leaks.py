@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.findings import Finding, Signal, column
 
 #: numbers of rows averaged before they are compared: the noise of a computed temperature may be on other scales
@@ -57,15 +58,18 @@ def leaks(temperatures: Sequence[Signal], displacements: Sequence[Signal], moved
                 if own and c > found.get(name, (0.0, ""))[0]:
                     found[name] = c, probe.channel.name
     if len(found) > max(1, len(temperatures) // 2):
-        names = ", ".join(found)
-        text = f"{names} have the noise of the displacements: interference on all wires; check shields and earth"
+        text = Message(
+            "{names} have the noise of the displacements: interference on all wires; check shields and earth",
+            names=", ".join(found),
+        )
         yield Finding("warning", "", "interference", text)
         return
     for name, (_, probe_name) in found.items():
-        text = (
-            f"has the noise of {probe_name}, in the same rows or some rows late: it seems to be computed from the "
+        text = Message(
+            "has the noise of {probe}, in the same rows or some rows late: it seems to be computed from the "
             "displacement, or to share its wiring. A model that uses it predicts the displacement from itself; leave "
-            "it out. If something switches every few rows, as a chiller may, record more often"
+            "it out. If something switches every few rows, as a chiller may, record more often",
+            probe=probe_name,
         )
         yield Finding("trouble", name, "leak", text, remedy=column(name, role="ignore"))
 

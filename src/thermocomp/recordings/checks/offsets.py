@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.core.starting import find_day, find_usual, may_be_right
 from thermocomp.core.thresholds import THRESHOLDS
 from thermocomp.recordings.checks.findings import Finding
@@ -40,14 +41,25 @@ def compare_starts(recordings: Sequence[Recording]) -> tuple[tuple[Finding, ...]
         for k, offset in enumerate(off[:, j].tolist()):
             if offset and not before:
                 last = next((i for i in range(k, len(off)) if not off[i, j]), len(off))
-                until = f"until {recordings[last - 1].name}" if last < len(off) else "to the last one"
+                until = Message("to the last one")
+                if last < len(off):
+                    until = Message("until {recording}", recording=recordings[last - 1].name)
                 mine = [o for o in off[k].tolist() if o]
                 other = may_be_right(mine, len(names), THRESHOLDS.zero_change)
-                instead = f" (or the others are off, by {-offset:+.1f} degC: which, cannot be told)" if other else ""
-                text = (
-                    f"starts {offset:+.1f} degC off the other temperatures, compared with the other recordings"
-                    f"{instead}, from here {until} ({last - k} of {len(off)}): a sensor that was moved, replaced or "
-                    "wired differently, or a machine that had not cooled. Only its rises from the start are used"
+                instead = (
+                    Message(" (or the others are off, by {offset:+.1f} degC: which, cannot be told)", offset=-offset)
+                    if other
+                    else ""
+                )
+                text = Message(
+                    "starts {offset:+.1f} degC off the other temperatures, compared with the other recordings"
+                    "{instead}, from here {until} ({n} of {of}): a sensor that was moved, replaced or wired "
+                    "differently, or a machine that had not cooled. Only its rises from the start are used",
+                    offset=offset,
+                    instead=instead,
+                    until=until,
+                    n=last - k,
+                    of=len(off),
                 )
                 found[k].append(Finding("warning", name, "offset", text, row=0))
             before = offset

@@ -6,6 +6,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks import suspects
 from thermocomp.recordings.checks.clocks import clocks
 from thermocomp.recordings.checks.findings import (
@@ -15,7 +16,6 @@ from thermocomp.recordings.checks.findings import (
     Signal,
     at_row,
     column,
-    count,
     cut_out,
     runs,
     speed_changes,
@@ -123,7 +123,7 @@ def _duplicates(recording: Recording) -> Iterator[Finding]:
         if np.nanmax(values, initial=-np.inf) > np.nanmin(values, initial=np.inf):  # constants are reported separately
             other = prints.setdefault(hash(values.tobytes()), channel.name)
             if other != channel.name:
-                text = f"has the same value as {other} in every row; leave one of them out"
+                text = Message("has the same value as {other} in every row; leave one of them out", other=other)
                 gone = column(channel.name, role="ignore")
                 yield Finding("warning", channel.name, "duplicate channel", text, remedy=gone)
 
@@ -169,10 +169,16 @@ def _channel(
 def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: FloatArray) -> Finding:
     least, most = PLAUSIBLE[channel.quantity]
     row = int(wild[np.argmax(np.abs(values[wild]))])
-    text = (
-        f"{count(wild.size, 'value')} of {len(values)} outside {least:g} to {most:g} {channel.unit}, the most "
-        f"extreme {values[row]:g} at {at_row(row, time)}: implausible for a machine; check unit, scale, zero and "
-        "sensor"
+    text = Message(
+        "{n} of {of} values outside {least:g} to {most:g} {unit}, the most extreme {value:g} at {row}: implausible for "
+        "a machine; check unit, scale, zero and sensor",
+        n=wild.size,
+        of=len(values),
+        least=least,
+        most=most,
+        unit=channel.unit,
+        value=float(values[row]),
+        row=at_row(row, time),
     )
     if wild.size == np.isfinite(values).sum():
         return Finding("trouble", channel.name, "implausible", text)
@@ -181,12 +187,14 @@ def _wild_finding(channel: Channel, values: FloatArray, wild: IntArray, time: Fl
 
 def _constant_finding(channel: Channel, x: FloatArray) -> Finding:
     sensed = channel.quantity in _SENSED
-    advice = (
-        "check whether the sensor is connected, or leave the channel out"
+    text = Message(
+        "is {value:g} {unit} in all {n} rows; check whether the sensor is connected, or leave the channel out"
         if sensed
-        else "a constant channel is of no use to a model"
+        else "is {value:g} {unit} in all {n} rows; a constant channel is of no use to a model",
+        value=float(x[0]),
+        unit=channel.unit,
+        n=len(x),
     )
-    text = f"is {x[0]:g} {channel.unit} in all {len(x)} rows; {advice}"
     gone = column(channel.name, role="ignore")
     return Finding("trouble" if sensed else "info", channel.name, "constant", text, remedy=gone)
 
@@ -197,7 +205,7 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
     Too few: under 10. Gap: over 5 times the 90 % quantile of the intervals. Irregular: intervals vary by over 20 %.
     """
     if len(time) < 10:
-        text = f"has only {count(len(time), 'row')}, too few to assess; record a whole warm-up and cool-down"
+        text = Message("too few rows to assess ({n}); record a whole warm-up and cool-down", n=len(time))
         yield Finding("warning", "", "short", text)
     if len(time) < 3:
         return
@@ -207,18 +215,24 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
     gaps = np.flatnonzero(steps > 5 * usual)
     if gaps.size:
         longest = int(gaps[np.argmax(steps[gaps])])
-        text = (
-            f"{count(gaps.size, 'gap')} in time, the longest {steps[longest]:.6g} s after {at_row(longest, time)}, "
-            f"where rows are {usual:g} s apart; the state of a model with a memory is uncertain after it: split the "
-            "test there or record it again"
+        text = Message(
+            "{gaps} {gap:.6g} s after {row}, where rows are {usual:g} s apart; the state of a model with a memory is "
+            "uncertain after it: split the test there or record it again",
+            gaps=Message("{n} gaps in time, the longest", n=gaps.size) if gaps.size > 1 else Message("1 gap in time,"),
+            gap=float(steps[longest]),
+            row=at_row(longest, time),
+            usual=usual,
         )
         yield Finding("warning", "", "gap", text, row=longest)
     kept = steps[steps <= 5 * usual]
     low, middle, high = (float(q) for q in np.quantile(kept, (0.05, 0.5, 0.95)))
     if high - low > 0.2 * middle:
-        text = (
-            f"rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); resample for methods that require a "
-            "constant interval"
+        text = Message(
+            "rows are {low:.4g} to {high:.4g} s apart (median {middle:.4g} s); resample for methods that require a "
+            "constant interval",
+            low=low,
+            high=high,
+            middle=middle,
         )
         # long enough for a row in every interval
         every = float(np.ceil(kept.max()))
@@ -229,19 +243,22 @@ def _sampling(time: FloatArray) -> Iterator[Finding]:
 def _no_cycle(recording: Recording) -> Iterator[Finding]:
     if len(recording.cycles) > 1:
         return
-    why = "there is no spindle speed and no column 'cycle'"
+    why = Message("there is no spindle speed and no column 'cycle'")
     if recording.speed is not None:
         speed = np.abs(np.nan_to_num(recording.table[recording.speed.name].to_numpy(dtype=np.float64)))
         runs = int(np.count_nonzero(np.diff(speed > 0.02 * speed.max(initial=0.0), prepend=False)) + 1) // 2
-        why = "the spindle does not start again"
+        why = Message("the spindle does not start again")
         if runs > 1:
-            why = (
-                f"none of the {runs} spindle starts follows a standstill of at least {SPLITS:.0f} s and precedes a "
-                f"run of at least {SPLITS:.0f} s (are the times in minutes or hours? Then state the unit in a "
-                "mapping: [time] unit)"
+            why = Message(
+                "none of the {n} spindle starts follows a standstill of at least {time:.0f} s and precedes a run of at "
+                "least {time:.0f} s (are the times in minutes or hours? Then state the unit in a mapping: [time] unit)",
+                n=runs,
+                time=SPLITS,
             )
-    text = (
-        f"the whole test is one thermal cycle, as {why}; judging on unseen cycles needs several cycles or several tests"
+    text = Message(
+        "the whole test is one thermal cycle, as {reason}; judging on unseen cycles needs several cycles or several "
+        "tests",
+        reason=why,
     )
     yield Finding("info", "", "no cycle", text)
 
@@ -269,14 +286,19 @@ def _code_finding(channel: Channel, values: FloatArray, coded: BoolArray, time: 
     first = int(np.flatnonzero(coded)[0])
     every = coded.sum() == np.isfinite(values).sum()
     if every:
-        text = (
-            f"is {codes} in every row, a value that loggers write for a missing reading: no sensor is connected; "
-            f"leave the channel out, or declare the value in a mapping, missing = [{codes}]"
+        text = Message(
+            "is {codes} in every row, a value that loggers write for a missing reading: no sensor is connected; leave "
+            "the channel out, or declare the value in a mapping, missing = [{codes}]",
+            codes=codes,
         )
     else:
-        text = (
-            f"{count(int(coded.sum()), 'value')} of {len(values)}, the first at {at_row(first, time)}, are {codes}, "
-            f"a value that loggers write for a missing reading; declare it in a mapping, missing = [{codes}]"
+        text = Message(
+            "{n} of {of} values, the first at {row}, are {codes}, a value that loggers write for a missing reading; "
+            "declare it in a mapping, missing = [{codes}]",
+            n=int(coded.sum()),
+            of=len(values),
+            row=at_row(first, time),
+            codes=codes,
         )
     rows = None if every else np.flatnonzero(coded)
     said = {"role": "ignore"} if every else {"missing": np.unique(values[coded]).tolist()}
@@ -291,22 +313,28 @@ def _missing(name: str, values: FloatArray, time: FloatArray, *, probed: bool) -
     if not n:
         return
     if n == len(values):
-        text = "has no value at all; leave the channel out"
+        text = Message("has no value at all; leave the channel out")
         yield Finding("trouble", name, "missing values", text, remedy=column(name, role="ignore"))
         return
     if probed:
-        text = (
-            f"has values in only {len(values) - n} of {len(values)} rows, the same rows as other displacements: "
-            "measured by probing cycles"
+        text = Message(
+            "has values in only {n} of {of} rows, the same rows as other displacements: measured by probing cycles; "
+            "models see only these rows",
+            n=len(values) - n,
+            of=len(values),
         )
-        yield Finding("info", name, "probed", f"{text}; models see only these rows")
+        yield Finding("info", name, "probed", text)
         return
     starts, lengths = runs(gone)
     starts, lengths = starts[gone[starts]], lengths[gone[starts]]
     longest = int(np.argmax(lengths))
-    text = (
-        f"{count(n, 'value')} of {len(values)} ({n / len(values):.1%}) missing, at most {lengths[longest]} "
-        f"consecutively, from {at_row(int(starts[longest]), time)}; models skip these rows: repair the sensor if "
-        "there are many"
+    text = Message(
+        "{n} of {of} values ({share:.1%}) missing, at most {most} consecutively, from {row}; models skip these rows: "
+        "repair the sensor if there are many",
+        n=n,
+        of=len(values),
+        share=n / len(values),
+        most=int(lengths[longest]),
+        row=at_row(int(starts[longest]), time),
     )
     yield Finding("trouble" if n > 0.2 * len(values) else "warning", name, "missing values", text)

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from thermocomp.core.arrays import BoolArray, FloatArray
-from thermocomp.recordings.checks.findings import Finding, Signal, at_row, count, cut_out
+from thermocomp.core.messages import Message
+from thermocomp.recordings.checks.findings import Finding, Signal, at_row, cut_out
 
 #: maximum number of rows of one spike; longer deviations are reported as two steps
 LONGEST = 10
@@ -51,10 +52,19 @@ def spikes(signal: Signal, time: FloatArray, moved: BoolArray) -> Iterator[Findi
         return
     top = int(hits[np.argmax(height[hits])])
     lengths = np.diff(np.flatnonzero(np.diff(hits, prepend=-5, append=len(x) + 5) != 1))
-    width = f" of {'up to ' * (len(lengths) > 1)}{lengths.max()} rows" if lengths.max() > 1 else ""
-    text = (
-        f"{count(len(lengths), 'spike')}{width}, the highest by {height[top]:.3g} {signal.channel.unit} at "
-        f"{at_row(int(rows[top]), time)} (usual noise {off:.2g}); delete the values or look for a loose contact"
+    n, longest = len(lengths), int(lengths.max())
+    if n > 1:
+        found = Message("{n} spikes of up to {rows} rows" if longest > 1 else "{n} spikes", n=n, rows=longest)
+    else:
+        found = Message("1 spike of {rows} rows" if longest > 1 else "1 spike", rows=longest)
+    text = Message(
+        "{spikes}, the highest by {height:.3g} {unit} at {row} (usual noise {noise:.2g}); delete the values or look "
+        "for a loose contact",
+        spikes=found,
+        height=float(height[top]),
+        unit=signal.channel.unit,
+        row=at_row(int(rows[top]), time),
+        noise=off,
     )
     yield cut_out("trouble" if height[top] > span else "warning", signal.channel, "spike", text, rows[hits], time)
 

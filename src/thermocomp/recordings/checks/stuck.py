@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.findings import Finding, Severity, Signal, at_row, cut_out, runs
 
 #: minimum number of constant rows
@@ -42,17 +43,26 @@ def stuck(signal: Signal, time: FloatArray) -> Iterator[Finding]:
             continue
         k = hits[0]
         first, last = int(rows[starts[k]]), int(rows[starts[k] + lengths[k] - 1])
-        more = f", one of {len(hits)} such periods" if len(hits) > 1 else ""
-        text = (
-            f"is constant at {x[starts[k]]:.6g} {channel.unit} for {lengths[k]} rows, from {at_row(first, time)} to "
-            f"{at_row(last, time)}{more}, although it varies from row to row before or after; check the sensor, then "
-            "delete the values or leave the channel out"
+        text = Message(
+            "is constant at {value:.6g} {unit} for {n} rows, from {first} to {last}{more}, although it varies from row "
+            "to row before or after; check the sensor, then delete the values or leave the channel out",
+            value=float(x[starts[k]]),
+            unit=channel.unit,
+            n=int(lengths[k]),
+            first=at_row(first, time),
+            last=at_row(last, time),
+            more=Message(", one of {n} such periods", n=len(hits)) if len(hits) > 1 else "",
         )
         # the first value of each section may be a real measurement
         concerned = np.concatenate([rows[starts[j] + 1 : starts[j] + lengths[j]] for j in sorted(hits)])
         yield cut_out(severity, channel, "stuck", text, concerned, time)
     if coarse:
-        text = f"moves in steps of {step:g} {channel.unit} over a span of {span:.3g}; a finer resolution would help"
+        text = Message(
+            "moves in steps of {step:g} {unit} over a span of {span:.3g}; a finer resolution would help",
+            step=step,
+            unit=channel.unit,
+            span=span,
+        )
         yield Finding("info", channel.name, "quantised", text)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.findings import Finding, Severity, Signal, column
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import NEAR, find_zeroing, is_far, level, turns
@@ -59,10 +60,14 @@ def _rank_correlation(a: Signal, b: Signal) -> float:
 
 
 def _wrong_unit(signal: Signal, low: float, high: float, unit: str, coldest: float) -> Finding:
-    text = (
-        f"lies between {low:.4g} and {high:.4g} degC all the time, which is implausible for a machine; read in "
-        f"{unit}, its lowest value would be {coldest:.1f} degC. If the values are in {unit}, state it in a mapping: "
-        f'unit = "{unit}"'
+    text = Message(
+        "lies between {low:.4g} and {high:.4g} degC all the time, which is implausible for a machine; read in {unit}, "
+        "its lowest value would be {coldest:.1f} degC. If the values are in {unit}, state it in a mapping: "
+        'unit = "{unit}"',
+        low=low,
+        high=high,
+        unit=unit,
+        coldest=coldest,
     )
     return Finding("trouble", signal.channel.name, "unit", text, remedy=column(signal.channel.name, unit=unit))
 
@@ -86,17 +91,24 @@ def displacement_units(signals: Sequence[Signal], temperatures: Sequence[Signal]
     all_of_them = np.isfinite(warming) and warming >= 1 and largest < 0.05 * warming
     for name, width in moving.items():
         if width > FAR:
-            text = (
-                f"changes by {width / 1000:.3g} mm in the whole test, more than any machine drifts. Are the values "
-                'in um or nm? Then state it in a mapping: unit = "um"'
+            text = Message(
+                "changes by {change:.3g} mm in the whole test, more than any machine drifts. Are the values in um or "
+                'nm? Then state it in a mapping: unit = "um"',
+                change=width / 1000,
             )
             yield Finding("trouble", name, "unit", text, remedy=column(name, unit="um"))
         if width >= 0.3 and not all_of_them:
             continue
-        against = f" while a temperature changes by {warming:.3g} degC" if np.isfinite(warming) else ""
-        text = (
-            f"changes by {width:.2g} um in the whole test{against}, less than any probe at a machine. Are the values "
-            'in mm? Then state it in a mapping: unit = "mm"; otherwise the probe is not in contact'
+        against = (
+            Message(" while a temperature changes by {warming:.3g} degC", warming=warming)
+            if np.isfinite(warming)
+            else ""
+        )
+        text = Message(
+            "changes by {change:.2g} um in the whole test{against}, less than any probe at a machine. Are the values "
+            'in mm? Then state it in a mapping: unit = "mm"; otherwise the probe is not in contact',
+            change=width,
+            against=against,
         )
         severity: Severity = "trouble" if warming >= 1 else "warning"
         yield Finding(severity, name, "unit", text, remedy=column(name, unit="mm"))
@@ -112,20 +124,30 @@ def zeros(recording: Recording, signals: Sequence[Signal]) -> Iterator[Finding]:
     zeroing = find_zeroing(recording)
     moved = [s.channel.name for s in signals if abs(level(recording, s.channel.name, zeroing)) > NEAR]
     if signals and turns(recording, zeroing):
-        told = f", where {', '.join(moved)} {'has' if len(moved) == 1 else 'have'} already moved" * bool(moved)
-        text = (
-            f"turns in the first row{told}: unless it was started at that moment, the zero was not taken at rest; "
-            "record from the standstill on, or state what went before with --start"
+        already = (
+            Message(
+                ", where {names} has already moved" if len(moved) == 1 else ", where {names} have already moved",
+                names=", ".join(moved),
+            )
+            if moved
+            else ""
+        )
+        text = Message(
+            "turns in the first row{moved}: unless it was started at that moment, the zero was not taken at rest; "
+            "record from the standstill on, or state what went before with --start",
+            moved=already,
         )
         severity: Severity = "warning" if moved else "info"
         yield Finding(severity, zeroing.speed, "turning start", text, row=0)
     for s in signals:
         if len(s.x) >= 3 and np.ptp(s.x) and is_far(recording, s.channel.name, zeroing):
             unit, start = s.channel.unit, level(recording, s.channel.name, zeroing)
-            text = (
-                f"starts at {start:.3g} {unit}, not near zero; models assume a probe zeroed at the start. If the "
-                "test continues another one, join the two files; otherwise take its first value as zero, in a "
-                'mapping: zero = "first"'
+            text = Message(
+                "starts at {start:.3g} {unit}, not near zero; models assume a probe zeroed at the start. If the test "
+                "continues another one, join the two files; otherwise take its first value as zero, in a mapping: "
+                'zero = "first"',
+                start=start,
+                unit=unit,
             )
             row = int(s.rows[0])
             zeroed = {"do": "rezero", "channels": [s.channel.name], "at": float(recording.time[row]), "to": 0.0}

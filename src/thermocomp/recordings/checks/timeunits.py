@@ -6,6 +6,7 @@ import numpy as np
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import Remedy
+from thermocomp.core.messages import Message, join
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.checks.findings import Finding, Severity, Signal
 
@@ -51,14 +52,25 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal], unit: str = "s")
     )
     severity: Severity = "trouble"
     if interval > _SPARSE:
-        told = f"rows are {interval:.6g} s ({interval / 3600:.3g} h) apart: no warm-up is as slow"
+        told = Message(
+            "rows are {interval:.6g} s ({hours:.3g} h) apart: no warm-up is as slow",
+            interval=interval,
+            hours=interval / 3600,
+        )
     elif long and moves and (fastest := float(np.quantile(moves, 0.25))) > _SLOW:
-        told = f"most temperatures take over {fastest / 86400:.3g} days for half of their range: no warm-up is as slow"
+        told = Message(
+            "most temperatures take over {days:.3g} days for half of their range: no warm-up is as slow",
+            days=fastest / 86400,
+        )
     elif dense and moves and (slowest := float(np.quantile(moves, 0.75))) < _QUICK:
-        told = f"rows are {interval:.2g} s apart, and most temperatures pass half of their range in {slowest:.2g} s: "
-        told += "no machine is as fast"
+        told = Message(
+            "rows are {interval:.2g} s apart, and most temperatures pass half of their range in {time:.2g} s: no "
+            "machine is as fast",
+            interval=interval,
+            time=slowest,
+        )
     elif dense and total < _BRIEF:
-        told = f"rows are {interval:.2g} s apart: no thermal test is as short"
+        told = Message("rows are {interval:.2g} s apart: no thermal test is as short", interval=interval)
         severity = "trouble" if moves or total < _NONE else "warning"
     else:
         return
@@ -67,7 +79,12 @@ def time_unit(time: FloatArray, temperatures: Sequence[Signal], unit: str = "s")
         severity=severity if unit else "warning",
         channel="",
         kind="time unit",
-        text=f"the test would last {_duration(total)}, and {told}. {_advice(ways, total, unit)}",
+        text=Message(
+            "the test would last {duration}, and {reason}. {advice}",
+            duration=_duration(total),
+            reason=told,
+            advice=_advice(ways, total, unit),
+        ),
         remedy={"time": {"unit": (*ways, unit)[0]}} if unit in _SCALES else None,
     )
 
@@ -88,24 +105,33 @@ def _likely_units(interval: float, total: float, unit: str) -> list[str]:
     return sorted(fitting, key=lambda u: abs(float(np.log(interval * factors[u] / _USUAL))))
 
 
-def _advice(ways: Sequence[str], total: float, unit: str) -> str:
+def _advice(ways: Sequence[str], total: float, unit: str) -> Message:
+    if not unit:
+        return Message("Check how the mapping states the times")
     if unit not in _SCALES:
-        return f"Check how {'the file' if unit else 'the mapping'} states the times"
+        return Message("Check how the file states the times")
     if not ways:
-        return f'If {unit} is the right unit, confirm it in a mapping: [time] unit = "{unit}"'
-    durations = [_duration(total * _SCALES[u] / _SCALES[unit]) for u in ways]
-    others = " or ".join(f"{u} (then it lasted {d})" for u, d in zip(ways, durations, strict=True))
-    return (
-        f'Are the times {others}? Then state it in a mapping: [time] unit = "{ways[0]}"; if {unit} is right, confirm '
-        f'it there: unit = "{unit}"'
+        return Message('If {unit} is the right unit, confirm it in a mapping: [time] unit = "{unit}"', unit=unit)
+    lasted = [_duration(total * _SCALES[u] / _SCALES[unit]) for u in ways]
+    each = [
+        Message("{unit} (then it lasted {duration})", unit=u, duration=d) for u, d in zip(ways, lasted, strict=True)
+    ]
+    return Message(
+        'Are the times {others}? Then state it in a mapping: [time] unit = "{other}"; if {unit} is right, confirm it '
+        'there: unit = "{unit}"',
+        others=join(each, Message(" or ")),
+        other=ways[0],
+        unit=unit,
     )
 
 
-def _duration(seconds: float) -> str:
+def _duration(seconds: float) -> Message:
     """Return a duration as text, in a readable unit."""
     if seconds < 1000:
-        return f"{seconds:.3g} s"
-    return f"{seconds / 3600:.2f} h" if seconds < 100 * 3600 else f"{seconds / 3600:.2f} h ({seconds / 86400:.4g} days)"
+        return Message("{seconds:.3g} s", seconds=seconds)
+    if seconds < 100 * 3600:
+        return Message("{hours:.2f} h", hours=seconds / 3600)
+    return Message("{hours:.2f} h ({days:.4g} days)", hours=seconds / 3600, days=seconds / 86400)
 
 
 def _half_span_time(signal: Signal, time: FloatArray, *, smooth: bool) -> float | None:

@@ -3,7 +3,11 @@
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const make = (tag, kind, text = "") => Object.assign(document.createElement(tag), { className: kind, textContent: text });
 const DASHES = [[], [8, 4], [2, 3], [8, 3, 2, 3]];
-const HINT = "Drag across to zoom in, double-click for all; a name hides its curve, with Ctrl all others. Keyboard: arrow keys, + and −.";
+// translations of the texts of the scripts, from the page
+const WORDS = JSON.parse((document.getElementById("words") || {}).textContent || "{}"), LANGUAGE = document.documentElement.lang || "en";
+const _ = (text, values = {}) => (WORDS[text] || text).replace(/\{(\w+)\}/g, (all, key) => key in values ? values[key] : all);
+const fixed = (v, digits) => v.toLocaleString(LANGUAGE, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: false });
+const HINT = _("Drag across to zoom in, double-click for all; a name hides its curve, with Ctrl all others. Keyboard: arrow keys, + and −.");
 
 function within(panel) {  // a spike beyond the limits does not flatten the rest, unless there is nothing else
   const [low, high] = panel.limits;
@@ -57,15 +61,15 @@ function options(panel, key, last, zoomed) {
     label: c.name, stroke: () => css(c.tone), width: c.name.startsWith("band, ") ? 0 : 1.5, dash: DASHES[c.dash % 4],
     paths: c.shape === "dots" ? () => null : c.shape ? uPlot.paths.stepped({ align: 1 }) : undefined,
     points: c.shape === "dots" ? { show: true, size: 8, fill: () => css(c.tone) } : { show: false },
-    value: (_, v) => v == null ? "–" : v.toFixed(panel.digits),
+    value: (_, v) => v == null ? "–" : fixed(v, panel.digits),
   }));
   const edges = panel.curves.flatMap((c, k) => c.name.startsWith("band, ") ? [k + 1] : []);
   return {
     width: 300, height: panel.height, title: panel.title, padding: [20, 12, 0, 0], focus: { alpha: 0.3 },
     scales: { x: { time: false }, y: { range: within(panel) } },
-    series: [{ label: "time", value: (_, t) => t == null ? "–" : `${t.toFixed(2)} h${cycle(t) && ", " + cycle(t)}` }, ...series],
+    series: [{ label: _("time"), value: (u, t) => t == null ? "–" : `${fixed(t, 2)} h${cycle(t) && ", " + cycle(t)}` }, ...series],
     bands: edges.length ? [{ series: edges.reverse(), fill: () => css("--band") }] : [],
-    axes: [{ ...axis, label: last ? "time [h]" : undefined, labelSize: 18, size: 32 }, { ...axis, size: 60 }],
+    axes: [{ ...axis, label: last ? _("time [h]") : undefined, labelSize: 18, size: 32 }, { ...axis, size: 60 }],
     cursor: { y: false, focus: { prox: 24 }, sync: { key, scales: ["x", null] }, dataIdx: (u, k, at) => k && panel.curves[k - 1].shape !== "dots" ? nearest(u.data[k], at) : at, drag: { x: true, y: false } },
     legend: { markers: { stroke: (u, k) => k ? `var(${panel.curves[k - 1].tone})` : "", fill: (u, k) => k && panel.curves[k - 1].shape === "dots" ? `var(${panel.curves[k - 1].tone})` : "none", dash: (u, k) => k && panel.curves[k - 1].dash ? "dashed" : "solid" } },
     hooks: { drawClear: [u => shade(u, panel.cycles)], draw: [u => number(u, panel.curves)], setScale: [zoomed] },
@@ -75,7 +79,7 @@ function options(panel, key, last, zoomed) {
 function enable(u, panel) {  // keyboard and screen reader
   const over = u.over, told = () => over.setAttribute("aria-valuetext", [...u.root.querySelectorAll(".u-legend tr")].map(r => [...r.children].map(c => c.textContent).join(" ")).join("; "));
   const names = [...u.root.querySelectorAll(".u-legend th")].slice(1);
-  const attributes = { role: "slider", tabindex: 0, "aria-label": `time cursor of ${panel.title}`, "aria-valuemin": 0, "aria-valuemax": 100, "aria-valuenow": 0 };
+  const attributes = { role: "slider", tabindex: 0, "aria-label": _("time cursor of {panel}", { panel: panel.title }), "aria-valuemin": 0, "aria-valuemax": 100, "aria-valuenow": 0 };
   for (const [name, value] of Object.entries(attributes)) over.setAttribute(name, value);
   over.addEventListener("keydown", event => {
     const step = { ArrowLeft: -1, ArrowRight: 1, PageUp: -20, PageDown: 20, Home: -1e9, End: 1e9 }[event.key], width = over.clientWidth;
@@ -109,7 +113,7 @@ function show(figure, number) {
     const { min, max } = u.scales.x;
     if (key === "x") for (const other of plots) if (other.scales.x.min !== min || other.scales.x.max !== max) other.setScale("x", { min, max });
   };
-  for (const [text, by] of [["zoom in", 0.5], ["zoom out", 2], ["all", 0]]) {
+  for (const [text, by] of [[_("zoom in"), 0.5], [_("zoom out"), 2], [_("all"), 0]]) {
     const button = make("button", "", text);
     button.addEventListener("click", () => zoom(plots[0], by));
     buttons.append(button, " ");
