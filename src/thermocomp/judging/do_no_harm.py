@@ -1,9 +1,9 @@
 """The do-no-harm gate: a model is accepted, unproven or refused, by its errors on independent cycles or files.
 
-The thermal cycles or files are unseen by the model; they are independent, unlike the rows of a drift. A model is better
-than a baseline if its error is smaller on average over these cycles or files, and if its output agrees with the
-baseline's error by a one-sided t-test over them (`thermocomp.judging.baselines`). It is harmful if it is much worse
-than no compensation in a single one. For the reasons see ``docs/decisions/0020-verdict.md`` and ``0048-proof.md``.
+The thermal cycles or files are unseen by the model and independent, unlike rows. A model is better than a baseline if
+its error is smaller on average over them, and if its output agrees with the baseline's error by a one-sided t-test
+(`thermocomp.judging.baselines`). It is harmful if it is much worse than no compensation in a single one. For the
+reasons see ``docs/decisions/0020-verdict.md`` and ``0048-proof.md``.
 """
 
 from collections.abc import Sequence

@@ -42,8 +42,8 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", _("A click on a point shows its sensors."), "quiet");
     said.setAttribute("role", "status");
     for (const part of [0, 0.25, 0.5, 0.75, 1]) svg.append(shape("line", { x1: L, x2: W - 8, y1: y(part * top), y2: y(part * top), class: "grid" }), shape("text", { x: L - 6, y: y(part * top) + 4, "text-anchor": "end" }, (part * top).toPrecision(2)));
-    for (let n = 1; n <= last; n += Math.ceil(last / 12)) svg.append(shape("text", { x: x(n), y: H - B + 28, "text-anchor": "middle" }, String(n)));
-    svg.append(shape("text", { x: (W + L) / 2, y: H - 4, "text-anchor": "middle" }, what));
+    for (let n = 1; n <= last; n += Math.ceil(last / 12)) svg.append(shape("text", { x: x(n), y: H - B + 24, "text-anchor": "middle" }, String(n)));
+    svg.append(shape("text", { x: (W + L) / 2, y: H - 1, "text-anchor": "middle" }, what));
     for (const p of points) {
       const dot = shape("circle", { cx: x(p.sensors.length) + 7 * (names.indexOf(p.model) - (names.length - 1) / 2) * Math.min(1, 6 / names.length), cy: y(p.error), r: 6, tabindex: 0, role: "button", "aria-pressed": "false", "aria-label": `${p.model}, ${p.sensors.length} ${what}: ${um(p.error)} ${unit}`, style: `fill: var(--c${names.indexOf(p.model) % 6})` });
       const choose = () => {
