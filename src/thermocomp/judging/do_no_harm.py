@@ -273,9 +273,8 @@ class Verdict:
         if moving < MIN_UNITS - 1:
             return f"only {moving} of {n} cycles or files have a significant drift"
         name = self.worst
-        if self.mean_ratios[name] >= 0:
-            return f"not shown to be better than {name}: {self._pooled(name)}"
-        return f"not shown to be better than {name}: {self._pooled(name)}, {self._tested()}"
+        tested = "" if self.mean_ratios[name] >= 0 else f", {self._tested()}"
+        return f"not shown to be better than {name}: {self._pooled(name)}{tested}"
 
     def _tested(self) -> str:
         tried = f", {self.tried} methods tried" if self.tried > 1 else ""
