@@ -4,7 +4,8 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 BENCH ?= .venv-bench
 PYTEST ?=
-# each test worker uses one core: more threads of linear algebra would compete with the other worker
+# each test worker uses one core: more threads of linear algebra would compete with the others. A third of the time of a
+# worker is spent waiting for programs under test, so three workers suit two cores
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-long check mutants bench docs verdicts count clean
@@ -27,7 +28,7 @@ demo: $(VENV)/.study
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium clang gcc gcc-arm-none-eabi libc6-dev libclang-rt-dev libnewlib-arm-none-eabi linuxcnc-uspace \
 		linuxcnc-uspace-dev mosquitto qemu-system-arm
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 3 --dist loadfile $(PYTEST)
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh gcc libc6-dev linuxcnc-uspace mosquitto

@@ -236,7 +236,7 @@ def recorded(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
     return [{n: float(row[n]) for n in names} for row in csv.DictReader(lines)]
 
 
-@pytest.mark.parametrize("times", [1, 10, 60])
+@pytest.mark.parametrize("times", [1, 10, pytest.param(60, marks=pytest.mark.long)])
 @pytest.mark.parametrize("resolution", [0.0, 0.1, 0.5, 1.0])
 def test_measured_raw_readings_are_no_stop(shared_data: Path, resolution: float, times: int) -> None:
     """Two printers that heat up and cool down, one of them without a sensor, and a machine tool; without a watch."""
