@@ -52,8 +52,9 @@ def to_verdict(page: "Page", files: list[Path]) -> int:
     assert page.locator("#progress .failed").count() == 0, page.inner_text("#progress")
     assert set(page.locator("#verdict tbody tr td:nth-child(3)").all_inner_texts()) <= {
         "accepted",
-        "rejected",
+        "accepted for this duty",
         "unproven",
+        "refused",
     }
     assert hand.errors == []
     return hand.clicks
