@@ -37,7 +37,8 @@ from thermocomp.core.size import Size
 from thermocomp.judging import splits
 from thermocomp.judging.baselines import BASELINES, OF_TIME
 from thermocomp.judging.compare import compare
-from thermocomp.judging.do_no_harm import LEVEL, Verdict, margin_of
+from thermocomp.judging.do_no_harm import LEVEL, Verdict
+from thermocomp.judging.judgedunits import margin_of
 from thermocomp.judging.replay import replay
 from thermocomp.models.training import train
 from thermocomp.recordings.cycles import Cycle

@@ -33,6 +33,10 @@ WORDS = (
     *("missing values", "probed", "quantised", "stuck", "spike", "unit", "turning start", "not zeroed", "loggers"),
     *("temperature", "displacement", "spindle speed", "position", "angle", "feed"),
     *("running", "done", "stopped", "failed"),
+    # baselines of the verdict
+    *("no compensation", "the learned mean", "the last learned value"),
+    *("no compensation, both re-zeroed at the start of the block", "no compensation (slow changes removed from both)"),
+    "the mean curve of the other cycles or files over time",
     "Conditions covered by the judged cycles or files",
 )
 

@@ -16,7 +16,8 @@ from thermocomp.core.learned import Learned
 from thermocomp.judging import splits, study
 from thermocomp.judging.baselines import CURVE, SLOW, Series, compare_errors, compare_with_time, worst_of
 from thermocomp.judging.compare import compare
-from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, measure
+from thermocomp.judging.do_no_harm import Verdict
+from thermocomp.judging.judgedunits import JudgedUnit, measure
 from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.stacking import stack

@@ -9,7 +9,8 @@ from scipy import stats
 
 from thermocomp.core.learned import Learned, probe_noise
 from thermocomp.judging import do_no_harm
-from thermocomp.judging.do_no_harm import JudgedUnit, Verdict, join_verdicts, margin_of, measure
+from thermocomp.judging.do_no_harm import Verdict, join_verdicts
+from thermocomp.judging.judgedunits import JudgedUnit, margin_of, measure
 from thermocomp.judging.recommend import holm
 
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from thermocomp.core.learned import Learned
 from thermocomp.judging.baselines import Series
-from thermocomp.judging.do_no_harm import Verdict, measure
+from thermocomp.judging.do_no_harm import Verdict
+from thermocomp.judging.judgedunits import measure
 from thermocomp.judging.recommend import holm
 from thermocomp.judging.repeats import group_repeats
 

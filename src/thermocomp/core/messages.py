@@ -36,7 +36,7 @@ class Message(str):
         return (self.template,), self.values
 
 
-def join(messages: Sequence[str], mark: str) -> str:
+def join(messages: Sequence[str], mark: str = "") -> str:
     """Return messages, of which there is at least one, as one message with a mark between them."""
     first, *others = messages
     for other in others:

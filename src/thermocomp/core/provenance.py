@@ -110,7 +110,7 @@ class HonestError:
         Person who approved the use of an unproven model, and the reason; empty if none.
     harm_margin : float or None
         Tolerated degradation in a single cycle, as set before the evaluation; None: calculated by
-        `thermocomp.judging.do_no_harm.margin_of`.
+        `thermocomp.judging.judgedunits.margin_of`.
     lost : dict of str to float
         RMS of the residual when a sensor, or several of them (``t1_C, t2_C``, in the order of the inputs), reads its
         reference value from the start, with the watch (sensor monitoring) active [unit of the model].

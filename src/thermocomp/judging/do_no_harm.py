@@ -7,17 +7,14 @@ reasons see ``docs/decisions/0020-verdict.md`` and ``0048-proof.md``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy import stats
 
-from thermocomp.core.arrays import FloatArray
-from thermocomp.core.learned import Learned
-from thermocomp.core.messages import Message
+from thermocomp.core.messages import Message, join
 from thermocomp.core.provenance import Word, accepted
-from thermocomp.core.size import Size
 from thermocomp.judging.baselines import (
     BASELINES,
     CURVE,
@@ -26,12 +23,10 @@ from thermocomp.judging.baselines import (
     SLOW,
     Against,
     OfTime,
-    Series,
     compare_with_time,
     p_above_least,
-    rezero,
-    worst_of,
 )
+from thermocomp.judging.judgedunits import JudgedUnit
 from thermocomp.judging.repeats import group_repeats
 from thermocomp.judging.splits import MIN_ROWS
 
@@ -41,66 +36,11 @@ MIN_UNITS = 3
 LEAST_P = 0.001
 #: significance level of the one-sided test
 LEVEL = 0.05
-#: largest harm tolerated by default [um], [urad]: 10 urad are 2 um at 200 mm
-MOST_MARGIN = {"um": 2.0, "urad": 10.0}
-#: the margin is the larger of this multiple of the probe's noise and this share of the largest training drift, capped
-TIMES_NOISE, SHARE = 3.0, 0.05
 #: drifts are of one duty if, slow changes removed, their mean curve leaves less than this share of them, and if the
 #: largest is less than this multiple of the smallest
 UNLIKE, SIZES = 0.6, 3.0
 #: reason against acceptance if the effects of noise and lost sensors were not tested
 UNTRIED = Message("the effects of noise and of a lost sensor were not tested: compare with robustness=True")
-#: a cycle or file whose deviation changes by less than this fraction of the largest training drift is not informative
-MOVES = 0.1
-
-
-@dataclass(frozen=True)
-class JudgedUnit:
-    """Results in one unseen cycle or file.
-
-    Parameters
-    ----------
-    rms, largest : float
-        RMS and largest absolute value of the residual [um].
-    baselines : tuple of Against
-        Comparison with each of `BASELINES`; in a section that continues the training data also with `REZEROED`.
-    none_largest : float
-        Largest deviation without compensation [um].
-    noise : float
-        Noise of the probe [um]; smaller errors are set to this value.
-    margin : float
-        Tolerated degradation [um].
-    moves : bool
-        Whether the deviation changes enough to distinguish a model from a constant.
-    series : Series or None
-        Rows for the comparison with the baselines that know the time; None: without these.
-    """
-
-    name: str
-    rows: int
-    rms: float
-    largest: float
-    baselines: tuple[Against, ...]
-    none_largest: float
-    noise: float
-    margin: float
-    moves: bool
-    series: Series | None = field(default=None, compare=False)
-
-    @property
-    def none_rms(self) -> float:
-        """RMS without compensation in this cycle or file [um]."""
-        return self.baselines[0].other
-
-    @property
-    def harm(self) -> float:
-        """Excess of the RMS or the largest error over that without compensation, whichever is larger [um]."""
-        return max(self.rms - self.none_rms, self.largest - self.none_largest)
-
-    @property
-    def harmful(self) -> bool:
-        """True if the harm exceeds the margin."""
-        return self.harm > self.margin
 
 
 @dataclass(frozen=True)
@@ -241,79 +181,109 @@ class Verdict:
     @property
     def reason(self) -> str:
         """Reason for the verdict in one sentence, with the decisive cycle, file or baseline."""
-        if self.refusal or not self.units:
-            return self.refusal or f"every cycle has fewer than {MIN_ROWS} rows of validation data"
-        stated = "" if self.stated is None else f"; the harm margin was set to {self.stated:g} {self.unit}"
-        return self._by_units() + stated
+        if self.refusal:
+            return self.refusal
+        if not self.units:
+            return Message("every cycle has fewer than {n} rows of validation data", n=MIN_ROWS)
+        if self.stated is None:
+            return self._by_units()
+        margin = Message("; the harm margin was set to {margin:g} {unit}", margin=self.stated, unit=self.unit)
+        return join([self._by_units(), margin])
 
     def _by_units(self) -> str:
         if any(u.harmful for u in self.units):
             worst = max(self.units, key=lambda u: u.harm - u.margin)
-            return f"does harm in {worst.name}: {self._figures(worst)} (margin {worst.margin:.2g} {self.unit})"
+            return Message(
+                "does harm in {cycle}: {figures} (margin {margin:.2g} {unit})",
+                cycle=worst.name,
+                figures=self._figures(worst),
+                margin=worst.margin,
+                unit=self.unit,
+            )
         if self._moving and self._unbeaten:
-            return f"no better than {self._unbeaten}: {self._pooled(self._unbeaten)}"
+            return Message("no better than {baseline}: {figures}", **self._pooled(self._unbeaten))
         return self._why_accepted() if self.accepted else self._why_unproven()
 
     def _why_accepted(self) -> str:
         least = max(self.units, key=lambda u: u.harm)
-        others = f"better than {self.worst} and the other baselines"
-        duty = "; the drift is much the same each time, so other speeds and durations are not proved" * self.one_duty
-        return f"{others}, {self._tested()}; smallest gain in {least.name}: {self._figures(least)}{duty}"
+        duty = Message("; the drift is much the same each time, so other speeds and durations are not proved")
+        return Message(
+            "better than {baseline} and the other baselines, {tested}; smallest gain in {cycle}: {figures}{duty}",
+            baseline=Message(self.worst),
+            tested=self._tested(),
+            cycle=least.name,
+            figures=self._figures(least),
+            duty=duty if self.one_duty else "",
+        )
 
     def _why_unproven(self) -> str:
         n, moving = len(self.units), self._moving
         if not moving:
-            return (
-                f"no significant drift in the validation data: {self._figures(self.units[0])} in {self.units[0].name}"
+            first = self.units[0]
+            return Message(
+                "no significant drift in the validation data: {figures} in {cycle}",
+                figures=self._figures(first),
+                cycle=first.name,
             )
         if self.caps:
-            return "; ".join(self.caps)
+            return join(self.caps, "; ")
         if n < MIN_UNITS:
-            return f"judged on only {n} of {MIN_UNITS} required cycles or files"
+            return Message("judged on only {n} of {of} required cycles or files", n=n, of=MIN_UNITS)
         if moving < MIN_UNITS - 1:
-            return f"only {moving} of {n} cycles or files have a significant drift"
-        name = self.worst
-        tested = "" if self.mean_ratios[name] >= 0 else f", {self._tested()}"
-        return f"not shown to be better than {name}: {self._pooled(name)}{tested}"
+            return Message("only {n} of {of} cycles or files have a significant drift", n=moving, of=n)
+        found = Message("not shown to be better than {baseline}: {figures}", **self._pooled(self.worst))
+        return found if self.mean_ratios[self.worst] >= 0 else join([found, self._tested()], ", ")
 
     def _tested(self) -> str:
-        tried = f", {self.tried} methods tried" if self.tried > 1 else ""
-        p = f"p = {self.p_value:.2g}" if self.p_value >= LEAST_P else f"p < {LEAST_P}"
-        return f"{p} over {len(self.units)} cycles or files{tried}{', ' if self.about else ''}{self.about}"
+        least = self.p_value < LEAST_P
+        found = Message(
+            "p < {p:g} over {n} cycles or files" if least else "p = {p:.2g} over {n} cycles or files",
+            p=LEAST_P if least else self.p_value,
+            n=len(self.units),
+        )
+        tried = Message("{n} methods tried", n=self.tried) if self.tried > 1 else ""
+        return join([found, *filter(None, (tried, self.about))], ", ")
 
     @property
     def told(self) -> str:
         """Return the reason, and for an unproven model the test that would decide the verdict."""
-        return f"{self.reason}; {self.advice}" if self.advice else self.reason
+        return join([self.reason, self.advice], "; ") if self.advice else self.reason
 
     @property
     def advice(self) -> str:
         """Thermal test that would decide an unproven verdict; empty for the other verdicts."""
         if self.word != "unproven" or self.caps == (UNTRIED,):  # the reason already gives the advice
             return ""
+        if any("one section" in cap for cap in self.caps):
+            return Message("judge it by leave-one-cycle-out or leave-one-file-out")
         if self.caps:
-            by_stretch = any("one section" in cap for cap in self.caps)
-            way = "by leave-one-cycle-out or leave-one-file-out" if by_stretch else "on recordings without this problem"
-            return f"judge it {way}"
-        n = len(self.units)
-        if n < MIN_UNITS:
-            more = MIN_UNITS - n
-            return f"record {more} more thermal cycle{'s' * (more > 1)}, at other speeds or on other days"
+            return Message("judge it on recordings without this problem")
+        n = MIN_UNITS - len(self.units)
+        if n > 0:
+            return Message(
+                "record {n} more thermal cycles, at other speeds or on other days"
+                if n > 1
+                else "record {n} more thermal cycle, at other speeds or on other days",
+                n=n,
+            )
         if self._moving < MIN_UNITS - 1:
-            return "record cycles with a warm-up or a change of speed"
+            return Message("record cycles with a warm-up or a change of speed")
         return self._more_units()
 
     def _more_units(self) -> str:
         """Advice if all required cycles or files were judged."""
         if self.worst == CURVE and self.one_duty:
-            return "the drift is much the same each time: record other speeds and durations"
+            return Message("the drift is much the same each time: record other speeds and durations")
         if self.worst == SLOW and len({u.series.record for u in self.units if u.series}) < MIN_UNITS:
-            return (
-                "the cycles of a recording share its warm-up and its days: let the machine cool and record again, "
-                f"{MIN_UNITS} starts in all, or run speeds in a random order"
+            return Message(
+                "the cycles of a recording share its warm-up and its days: let the machine cool and record again, {n} "
+                "starts in all, or run speeds in a random order",
+                n=MIN_UNITS,
             )
         more = self._units_for(LEVEL if self.p is None else LEVEL / max(self.tried, 1))
-        return f"about {more} cycles or files in all would decide" if more else "many more cycles would be needed"
+        if more:
+            return Message("about {n} cycles or files in all would decide", n=more)
+        return Message("many more cycles would be needed")
 
     def _units_for(self, level: float) -> int | None:
         """Return the number of cycles or files with such errors that would suffice for acceptance; None if over 50."""
@@ -325,62 +295,29 @@ class Verdict:
         return None
 
     def _figures(self, u: JudgedUnit) -> str:
-        text = f"RMS {u.rms:.2f} {self.unit}, {u.none_rms:.2f} {self.unit} without compensation"
-        if u.rms - u.none_rms < u.harm:
-            text += f", largest {u.largest:.2f} and {u.none_largest:.2f} {self.unit}"
-        return text
+        largest = u.rms - u.none_rms < u.harm
+        return Message(
+            "RMS {rms:.2f} {unit}, {none:.2f} {unit} without compensation, largest {largest:.2f} and "
+            "{none_largest:.2f} {unit}"
+            if largest
+            else "RMS {rms:.2f} {unit}, {none:.2f} {unit} without compensation",
+            rms=u.rms,
+            none=u.none_rms,
+            unit=self.unit,
+            largest=u.largest,
+            none_largest=u.none_largest,
+        )
 
-    def _pooled(self, name: str) -> str:
-        mine, other = np.sqrt(np.mean(np.square([(a.rms, a.other) for a in self.compared[name]]), axis=0))
-        return f"RMS {mine:.2f} {self.unit} compared with {other:.2f} {self.unit} over all cycles or files"
-
-
-def measure(
-    name: str,
-    measured: FloatArray,
-    predicted: FloatArray,
-    learned: Learned,
-    *,
-    alone: FloatArray | None = None,
-    unit: str = "um",
-    margin: float | None = None,
-    stretch: bool = False,
-    series: tuple[str, FloatArray] | None = None,
-) -> JudgedUnit:
-    """Return the results of a model in one unseen cycle or file.
-
-    Parameters
-    ----------
-    measured, predicted : ndarray of shape (n_rows,)
-        Deviations of one unseen cycle or file [um].
-    alone : ndarray of shape (n_rows,), optional
-        Prediction of the model alone, if `predicted` is the output of a compensator: the worse one counts, so no model
-        is accepted because of limits [um].
-    margin : float, optional
-        Tolerated degradation [um], set before the evaluation; see `margin_of`.
-    series : tuple of str and ndarray of shape (n_rows,), optional
-        Fingerprint of the recording, and time since its start [s]: see `Series`.
-    """
-    errors = [measured - predicted]
-    if alone is not None and not np.array_equal(alone, predicted):
-        errors.append(measured - alone)
-    sizes = [Size.of(e) for e in errors]
-    others = [worst_of(errors, measured - b, learned.noise) for b in (0.0, learned.mean, learned.last)]
-    if stretch:
-        others.append(worst_of([rezero(e) for e in errors], rezero(measured), learned.noise))
-    span = float(np.ptp(measured)) - 4 * learned.noise  # minus the span of the noise alone
-    return JudgedUnit(
-        name=name,
-        rows=len(measured),
-        rms=max(s.rms for s in sizes),
-        largest=max(s.largest for s in sizes),
-        baselines=tuple(others),
-        none_largest=float(np.abs(measured).max()),
-        noise=learned.noise,
-        margin=margin_of(learned, unit) if margin is None else margin,
-        moves=span > max(TIMES_NOISE * learned.noise, MOVES * learned.largest),
-        series=None if series is None else Series(*series, measured, tuple(errors)),
-    )
+    def _pooled(self, name: str) -> dict[str, str]:
+        """Return a baseline, and the RMS over all cycles or files compared with it."""
+        mine, other = np.sqrt(np.mean(np.square([(a.rms, a.other) for a in self.compared[name]]), axis=0)).tolist()
+        figures = Message(
+            "RMS {rms:.2f} {unit} compared with {other:.2f} {unit} over all cycles or files",
+            rms=mine,
+            other=other,
+            unit=self.unit,
+        )
+        return {"baseline": Message(name), "figures": figures}
 
 
 def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ...] = ()) -> Verdict:
@@ -393,8 +330,3 @@ def join_verdicts(parts: Sequence[Verdict], about: str = "", caps: tuple[str, ..
         about=about,
         stated=parts[0].stated,
     )
-
-
-def margin_of(learned: Learned, unit: str = "um") -> float:
-    """Return the default of the tolerated degradation in a single cycle or file [unit]."""
-    return min(max(TIMES_NOISE * learned.noise, SHARE * learned.largest), MOST_MARGIN.get(unit, np.inf))

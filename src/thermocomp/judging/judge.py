@@ -8,8 +8,9 @@ import numpy as np
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.learned import Learned
+from thermocomp.core.messages import Message
 from thermocomp.core.model import ErrorModel
-from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging import do_no_harm, judgedunits, metrics
 from thermocomp.judging.guards import Guard
 from thermocomp.judging.probing import Probings
 from thermocomp.judging.replay import replay_compensated
@@ -116,7 +117,7 @@ def _verdict(
     against, (run, alone) = learned or samples.learned(target, rows), both
     return do_no_harm.Verdict(
         units=tuple(
-            do_no_harm.measure(
+            judgedunits.measure(
                 unit,
                 measured[mine],
                 run[mine],
@@ -132,7 +133,7 @@ def _verdict(
         ),
         unit=model.unit,
         caps=_caps(split, learned, samples, target, watched),
-        refusal="" if model.sensors else "a model without a sensor is a constant, not a compensation",
+        refusal="" if model.sensors else Message("a model without a sensor is a constant, not a compensation"),
         stated=rules.margin,
     )
 
@@ -160,11 +161,13 @@ def _caps(
     others = {c.name for k, c in enumerate(samples.targets) if k != target} | set(watched)
     found = [text for channel, text in samples.trouble if channel not in others]
     if split.stretch:
-        found.append("judged on one section that continues the training data")
+        found.append(Message("judged on one section that continues the training data"))
     if learned is None:
         found.append(
-            "the model does not contain the mean and last value of the training data, so it cannot be compared with "
-            "these constants"
+            Message(
+                "the model does not contain the mean and last value of the training data, so it cannot be compared "
+                "with these constants"
+            )
         )
     return tuple(found)
 

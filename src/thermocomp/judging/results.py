@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from thermocomp.core.arrays import FloatArray, IntArray
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message, join
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.provenance import Word, accepted
-from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging import do_no_harm, judgedunits, metrics
 from thermocomp.judging.diagnostics import Collinearity
 from thermocomp.judging.inuse import InUse, least
 from thermocomp.judging.probing import Probed
@@ -34,7 +35,7 @@ class Rules:
     ----------
     margin : float or None
         Tolerated degradation in a single cycle or file [unit of the target]; None: calculated by
-        `do_no_harm.margin_of`.
+        `judgedunits.margin_of`.
     primary : str or None
         Primary method: its verdict is found without a correction for multiple comparisons, those of the others with
         one.
@@ -224,24 +225,28 @@ class Assessment:
         if self.robustness is None or not self.verdict.accepted:
             return ""
         margin = max(u.margin for u in self.verdict.units)  # a stated one applies to the judged errors only
-        most = do_no_harm.MOST_MARGIN.get(self.verdict.unit, np.inf)
+        most = judgedunits.MOST_MARGIN.get(self.verdict.unit, np.inf)
         return self.robustness.harm_beyond(min(margin, most))
 
     @property
     def reason(self) -> str:
         """Reason for the verdict, and for an unproven one the test that would decide it."""
         if self.failure:
-            return f"could not be judged: {self.failure}"
-        fragile = (
-            f"{self._fragile}; use fewer sensors (thermocomp select) or filter the readings" if self._fragile else ""
+            return Message("could not be judged: {reason}", reason=self.failure)
+        if self.caveat:
+            return self.caveat
+        reason = self.verdict.told
+        if fragile := self._fragile:
+            advice = Message("; use fewer sensors (thermocomp select) or filter the readings")
+            reason = join([fragile, advice])
+        if not self.learned:
+            return reason
+        left_out = Message(
+            "; {n:,} of {of:,} rows were used for training and are left out",
+            n=self.learned,
+            of=len(self.measured) + self.learned,
         )
-        told = self.caveat or fragile or self.verdict.told
-        if self.caveat or not self.learned:
-            return told
-        return (
-            f"{told}; {self.learned:,} of {len(self.measured) + self.learned:,} rows were used for training and are "
-            "left out"
-        )
+        return join([reason, left_out])
 
 
 def with_uncertainty(found: Sequence[Assessment], recordings: Sequence[Recording]) -> tuple[Assessment, ...]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.messages import Message, join
 from thermocomp.core.model import ErrorModel
 from thermocomp.core.size import Size
 from thermocomp.judging.guards import Guard
@@ -77,18 +78,23 @@ class Robustness:
 
     def harm_beyond(self, margin: float) -> str:
         """Return the disturbances that make a model worse than no compensation by more than a margin [um], as text."""
-        told = [f"{what} ({rms:.2f} um)" for what, rms in self._above(self.none_rms + margin).items()]
-        more = f" and {len(told) - 4} more" if len(told) > 4 else ""
-        return (
-            f"worse than no compensation ({self.none_rms:.2f} um RMS) with {', '.join(told[:4])}{more}" if told else ""
+        above = self._above(self.none_rms + margin)
+        if not above:
+            return ""
+        told = join([Message("{what} ({rms:.2f} um)", what=what, rms=rms) for what, rms in [*above.items()][:4]], ", ")
+        return Message(
+            "worse than no compensation ({none:.2f} um RMS) with {disturbances}",
+            none=self.none_rms,
+            disturbances=told if len(above) <= 4 else Message("{names} and {n} more", names=told, n=len(above) - 4),
         )
 
-    def _above(self, limit: float) -> dict[str, float]:
+    def _above(self, limit: float) -> dict[Message, float]:
         """Return the disturbances whose RMS exceeds a limit, with the RMS [um]: of a kind, the worst first."""
         lost = sorted(self.lost_rms.items(), key=lambda item: -item[1])
         off = sorted(self.deviating.items(), key=lambda item: -item[1][1])
-        found = {f"noise of {self.noise:g} degC": self.noisy_rms} | {f"loss of {name}": rms for name, rms in lost}
-        found |= {f"{name} off by {by:.2g} degC": rms for name, (by, rms) in off}
+        found = {Message("noise of {noise:g} degC", noise=self.noise): self.noisy_rms}
+        found |= {Message("loss of {sensor}", sensor=name): rms for name, rms in lost}
+        found |= {Message("{sensor} off by {by:.2g} degC", sensor=name, by=by): rms for name, (by, rms) in off}
         return {what: rms for what, rms in found.items() if rms > limit}
 
     @property

@@ -7,8 +7,8 @@ from thermocomp.core.starting import describe_offsets
 from thermocomp.judging import coverage
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.choice import Choice, Table
-from thermocomp.judging.do_no_harm import JudgedUnit
 from thermocomp.judging.faultlog import find_faults
+from thermocomp.judging.judgedunits import JudgedUnit
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.judging.robustness import Robustness
 from thermocomp.judging.study import Fitted

@@ -12,7 +12,7 @@ from thermocomp.core.exceptions import FitError
 from thermocomp.core.learned import Learned
 from thermocomp.core.provenance import RULES, HonestError
 from thermocomp.core.size import Size
-from thermocomp.judging import do_no_harm, metrics
+from thermocomp.judging import do_no_harm, judgedunits, metrics
 from thermocomp.judging.baselines import compare_errors
 from thermocomp.judging.replay import replay
 from thermocomp.judging.splits import Judging, Split
@@ -205,14 +205,14 @@ def assess_together(one: ComponentStates, parts: Sequence[JudgedSplit], options:
 
 def _unit(
     name: str, errors: Sequence[tuple[FloatArray, FloatArray, FloatArray]], unit: str, *, thermal: bool
-) -> do_no_harm.JudgedUnit:
+) -> judgedunits.JudgedUnit:
     """Return a cycle with the errors of its profiles: without compensation, with the cold profile alone, model."""
     rms = np.array([[Size.of(e).rms for e in triple] for triple in errors])
     points = np.array([len(triple[0]) for triple in errors])
     weights = np.repeat(np.sqrt(np.mean(points) / points), points)  # every profile counts the same
     none, geometric, left = (weights * np.concatenate(e) for e in zip(*errors, strict=True))
     largest = float(rms[:, 0].max())
-    return do_no_harm.JudgedUnit(
+    return judgedunits.JudgedUnit(
         name=name,
         rows=len(rms),
         rms=Size.of(left).rms,
@@ -220,7 +220,7 @@ def _unit(
         baselines=tuple(compare_errors(left, other, 0.0) for other in ((none, geometric) if thermal else (none,))),
         none_largest=largest,
         noise=0.0,
-        margin=do_no_harm.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
+        margin=judgedunits.margin_of(Learned(0.0, 0.0, 0.0, largest), unit),
         moves=True,
     )
 
