@@ -149,14 +149,16 @@ def test_a_recording_without_the_target(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_measured_machines(shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A spindle: one sensor is refused, three are accepted. A printer: a night proves nothing, and may be taken."""
+    """A spindle: one sensor is refused, three are unproven. A printer: a night proves nothing, and may be taken."""
     drift, model = str(shared_data / "fl_thermal" / "recording.csv"), str(tmp_path / "fl.json")
     assert run(["fit", drift, "--target", "ch1_um", "--model", "dynamic", "-o", model]) == 0
     line = ["export", model, drift, "--axes", "ch1_um=Z", "--date", "2026-01-31", "-o", str(tmp_path / "fl")]
     assert run([*line, "--to", "klipper"]) == 1
     assert "does harm in 1 (1250 1/min)" in capsys.readouterr().out
-    assert run([*line, "--to", "heidenhain"]) == 0
-    assert "1.83 times" in (tmp_path / "fl" / "tc_thermal.txt").read_text()
+    assert run([*line, "--to", "heidenhain"]) == 1
+    assert "not shown to be better than no compensation (slow changes removed" in capsys.readouterr().out
+    assert run([*line, "--to", "heidenhain", "--accept-unproven", "M. Weber, trial"]) == 0
+    assert "1.75 times" in (tmp_path / "fl" / "tc_thermal.txt").read_text()
 
     mapping = ["--mapping", str(Path(__file__).parents[1] / "recordings" / "voron.toml")]
     night = str(shared_data / "voron_frame" / "frame_exp_quant_v3_2021-06-13_05-41-53.csv")
