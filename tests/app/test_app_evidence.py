@@ -1,6 +1,8 @@
 """What the page shows of finished runs: methods with their curves, sensors against error, two runs side by side."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +117,25 @@ def test_other_folders_are_refused(finished_project: Path, project: str) -> None
             assert (await client.get(f"/{TOKEN}/api/{path}")).status_code == 422
 
     asked_of(finished_project, work)
+
+
+def test_a_package_is_one_file(finished_project: Path, tmp_path: Path) -> None:
+    folder = copy_of(finished_project, tmp_path / "mine")
+    package = folder / "runs" / "1" / "export-st"
+    package.mkdir()
+    for name in ("a.st", "read me.md"):
+        (package / name).write_text(f"content of {name}", encoding="utf-8")
+
+    async def work(client: httpx.AsyncClient) -> None:
+        answer = await client.get(f"/{TOKEN}/api/runs/1/zip/export-st")
+        with zipfile.ZipFile(io.BytesIO(answer.content)) as whole:
+            assert whole.namelist() == ["export-st/a.st", "export-st/read me.md"]
+            assert whole.read("export-st/a.st") == b"content of a.st"
+        for wrong in ("plan", "export-c99", "..", "export-st%2F..%2F..", "run.json"):
+            assert (await client.get(f"/{TOKEN}/api/runs/1/zip/{wrong}")).status_code in (404, 422), wrong
+        assert (await client.get(f"/{TOKEN}/api/runs/2/zip/export-st")).status_code == 404
+
+    asked_of(folder, work)
 
 
 def test_names_that_are_scripts_never_run(tmp_path: Path) -> None:

@@ -208,6 +208,6 @@ def test_no_name_runs_as_a_script(tmp_path: Path) -> None:
             opened.value.close()
         page.locator("#tab-deploy").click()
         page.locator("#target .main").click()
-        page.wait_for_selector("#package li a, #progress .failed", timeout=120_000)
+        page.wait_for_selector("#package a.main, #progress .failed", timeout=120_000)
         look_at(page)
         assert dialogs == []

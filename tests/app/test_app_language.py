@@ -109,6 +109,9 @@ def test_no_english_on_the_page(tmp_path: Path) -> None:
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert not [text for text in english if any(text in shown for shown in texts)]
         assert "Ergebnis von Lauf 1, auf nicht gelernten Daten" in texts[1]
+        assert "die Wirkung von Rauschen und eines Sensorausfalls wurde nicht geprüft" in (
+            page.text_content("#verdict") or ""
+        )
         page.select_option("#language", "en")
         page.wait_for_function("document.documentElement.lang === 'en'")
         assert errors == []

@@ -279,7 +279,7 @@ def test_the_whole_way_in_a_browser(tmp_path: Path) -> None:
         page.locator("#tab-deploy").click()
         page.select_option("#to", "linuxcnc")
         page.locator("#target .main").press("Enter")
-        page.wait_for_selector("#package li a", timeout=120_000)
+        page.wait_for_selector("#package a.main", timeout=120_000)
         assert seen_by_axe(page) == []
         assert errors == []
     assert json.loads((folder / "runs" / "1" / "run.json").read_text(encoding="utf-8"))["state"] == "done"

@@ -72,6 +72,7 @@ def test_a_model_is_tried_live(finished_project: Path, tmp_path: Path) -> None:
                 time.sleep(0.2)
             assert [(t["name"], t["correction_um"]) for t in state["targets"]] == [("z_um", 0.0)]
             if len(addresses) == 1:
+                assert "reading_age = 180.0" in (folder / "runs/1/trial/live.toml").read_text(encoding="utf-8")
                 page.get_by_role("button", name="End the trial").press("Enter")
                 page.get_by_role("button", name="Try it live").wait_for()
                 assert not answers(addresses[0])

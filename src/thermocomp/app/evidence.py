@@ -14,6 +14,7 @@ from thermocomp.core.correction import Limits
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.budget import Budget
 from thermocomp.report import curves
+from thermocomp.report.language import translate
 
 #: maximum number of points of each curve
 POINTS = 800
@@ -27,6 +28,7 @@ shadow = true                        # EDIT: nothing is corrected until this lin
 own_compensation = "unknown"         # EDIT: thermal compensation of the controller: "off" or "on"
 first_start = "order"                # corrections begin with the order "start" on the page
 
+# the recordings have a row every {interval:.0f} s; reading_age must be longer than the interval of the source
 {limits}[[sources]]
 kind = "mqtt"
 topic = "machine/temperatures"       # EDIT: messages with {channels}
@@ -72,9 +74,21 @@ def _points(found: Budget) -> list[dict[str, Any]]:
     ]
 
 
-def live_configuration(models: Sequence[ErrorModel], limits: Limits) -> str:
-    """Return a configuration of ``thermocomp serve`` for fitted models; what depends on the machine is marked."""
+def reasons_of(found: Compared) -> str:
+    """Return the translation of the reasons of verdicts, by their English text, as JSON."""
+    reasons = {a.reason for a in found.comparison.overall()}
+    return as_text({"words": {str(r): str(translate(r)) for r in sorted(reasons)}})
+
+
+def live_configuration(models: Sequence[ErrorModel], limits: Limits, interval: float) -> str:
+    """Return a configuration of ``thermocomp serve`` for fitted models; what depends on the machine is marked.
+
+    Parameters
+    ----------
+    interval : float
+        Interval between the rows of the recordings [s].
+    """
     used = list(dict.fromkeys(name for m in models for name in m.sensors)) or ["t1_C"]
     table = f"{tomlkit.dumps({'limits': asdict(limits)})}\n"
     channels = ", ".join(json.dumps(name) for name in used)
-    return _LIVE.format(limits=table, channels=channels, first=json.dumps(used[0]))
+    return _LIVE.format(interval=interval, limits=table, channels=channels, first=json.dumps(used[0]))

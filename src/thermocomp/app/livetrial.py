@@ -17,6 +17,8 @@ from thermocomp.core.exceptions import InputError
 
 #: longest time from the start to the address of the live page [s]
 PATIENCE = 120.0
+#: age at which a reading is stale [s], and as a multiple of the recording's interval: the larger
+AGE, INTERVALS = 60.0, 3.0
 #: the recording is replayed this many times faster than it was recorded
 SPEED = 60
 _ADDRESS = b"Page: "
@@ -26,6 +28,9 @@ models = ["../model.json"]
 shadow = true
 speed = {speed}.0
 first_start = "zero"
+
+[limits]
+reading_age = {age:.0f}.0
 
 [[sources]]
 kind = "replay"
@@ -115,7 +120,8 @@ def main() -> None:
         recording = read(joined) if joined.exists() else read(file, mapping or None)
         trial.mkdir(exist_ok=True)
         write(recording, trial / "replay.csv", overwrite=True)
-        write_text(_CONFIG.format(speed=SPEED), trial / "live.toml", overwrite=True)
+        age = max(AGE, INTERVALS * recording.sampling_interval)
+        write_text(_CONFIG.format(speed=SPEED, age=age), trial / "live.toml", overwrite=True)
         sys.exit(serve(trial / "live.toml"))
     except (InputError, OSError) as e:
         sys.exit(str(e))

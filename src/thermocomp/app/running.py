@@ -14,7 +14,7 @@ from thermocomp.api.plan import plan
 from thermocomp.api.results import Compared, FittedModels
 from thermocomp.api.select import select
 from thermocomp.api.verbs import assess, compare
-from thermocomp.app.evidence import curves_of, live_configuration, points_of
+from thermocomp.app.evidence import curves_of, live_configuration, points_of, reasons_of
 from thermocomp.app.project import COMMON, Project, ProjectRecording, given
 from thermocomp.app.runfolder import RunFolder, RunStep, new_run, runs_of
 from thermocomp.app.store import NAME
@@ -174,7 +174,10 @@ class ProjectRun:
         options = given(self.settings.compare)
         self.compared = found = compare(tests, limits=self.settings.limits, progress=self._progress(), **options)
         files = self._write(
-            found, (found.report, "comparison.html"), (partial(write_text, curves_of(found)), "curves.json")
+            found,
+            (found.report, "comparison.html"),
+            (partial(write_text, curves_of(found)), "curves.json"),
+            (partial(write_text, reasons_of(found)), "words.json"),
         )
         if found.comparison.left:
             raise KeyboardInterrupt
@@ -186,7 +189,8 @@ class ProjectRun:
             raise InputError(f"{self.project.file}: a recording or mapping was changed during the run; start it again")
         fit = self.settings.fit
         self.fitted = found = self.compared.fit(dict(fit.model), accept_unproven=fit.accept_unproven or None)
-        live = live_configuration(found.fitted.models, self.settings.limits)
+        interval = max(r.sampling_interval for r in self.compared.recordings)
+        live = live_configuration(found.fitted.models, self.settings.limits, interval)
         return self._write(found, (found.save, "model.json"), (partial(write_text, live), "live.toml"))
 
     def _select(self) -> tuple[list[str], str]:

@@ -1,16 +1,19 @@
 """Routes of the page for the evidence of its runs: curves of a method, two runs side by side, the trial of a model."""
 
+import io
+import zipfile
 from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter
 from fastapi import Path as InPath
 from starlette.exceptions import HTTPException
+from starlette.responses import Response
 
 from thermocomp.app.comparing import compare_runs, read_json
 from thermocomp.app.livetrial import LiveTrial
 from thermocomp.app.runfolder import RunFolder, runs_of
-from thermocomp.app.store import NAME, Store
+from thermocomp.app.store import NAME, Store, find_inside
 from thermocomp.core.exceptions import InputError
 from thermocomp.live.page.doors import Json
 
@@ -43,6 +46,16 @@ def view_runs(store: Store) -> APIRouter:
             if (one["target"], one["model"]) == (target, model):
                 return Json(one["panels"])
         raise HTTPException(404, f"run {number} has no curves of {model} for {target}")
+
+    @router.get("/api/runs/{number}/zip/{name}")
+    def package(number: RunNumber, name: str) -> Response:
+        folder, content = find_inside(run_of(store.folder, number).path, name), io.BytesIO()
+        if not name.startswith("export") or not folder.is_dir():
+            raise HTTPException(404, f"run {number} has no package {name}")
+        with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as whole:
+            for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+                whole.write(path, f"{name}/{path.relative_to(folder).as_posix()}")
+        return Response(content.getvalue(), media_type="application/zip")
 
     @router.get("/api/projects")
     def projects() -> Json:

@@ -19,7 +19,9 @@ from thermocomp.recordings.cycles import Cycle
 from thermocomp.recordings.declared import Declared
 from thermocomp.recordings.frames import parts_of
 
-AMBIENT = re.compile(r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung)(?:$|[_\W])", re.IGNORECASE)
+AMBIENT = re.compile(
+    r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung\w*|luft|raum\w*|halle\w*)(?:$|[_\W])", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, eq=False)

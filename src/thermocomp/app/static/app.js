@@ -13,7 +13,7 @@ function element(tag, text = "", kind = "", ...inner) { const e = make(tag, kind
 function scrolling(inner) { const e = element("div", "", "scroll", inner); e.tabIndex = 0; e.setAttribute("role", "region"); e.setAttribute("aria-label", _("table")); return e; }
 function button(text, run, kind = "") { const b = element("button", text, kind); b.type = "button"; b.addEventListener("click", run); return b; }
 async function api(path, method = "GET", body, raw = false) {
-  alarm();
+  if (method !== "GET") alarm();  // what the page reads by itself leaves the answer to the last request
   const sent = body === undefined ? {} : raw ? { body } : { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
   let answer;
   try { answer = await fetch(path, { method, ...sent }); } catch { alarm(_("The page has lost its server: start thermocomp app again.")); throw new Error("lost"); }
@@ -126,9 +126,12 @@ function boxes(id, names, chosen, kind = "checkbox") {
 
 function judgeForm() {  // only what is not yet shown: a choice of the user stays
   const compare = state.settings.compare || {}, names = [...new Set(Object.values(seen).flatMap(s => s.targets || []))];
+  const several = (state.settings.recordings || []).length > 1;
   if ([...document.querySelectorAll("#targets input")].map(i => i.value).join() !== names.join()) boxes("targets", names.map(n => [n, n]), compare.targets || names);
   if (!$("methods").children.length) boxes("methods", METHODS.map(n => [n, n]), compare.models || METHODS.slice(0, USUAL));
   if (!$("units").children.length) boxes("units", Object.entries(UNIT), [compare.leave_one || "cycle"], "radio");
+  const byFile = document.querySelector("#units [value=file]");
+  byFile.disabled = !several && !byFile.checked;
 }
 const chosen = id => [...document.querySelectorAll(`#${id} input:checked`)].map(i => i.value);
 
@@ -137,10 +140,11 @@ const startRun = quietly(async event => {
   const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
   if (!targets.length || !models.length) return alarm(_("Choose at least one deviation and one method."));
   for (const [key, value, usual] of [["targets", targets, targets.length === all], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
+  $("progress").replaceChildren(_("starting ..."));
   const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
   await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
   await api(`api/runs?again=${$("again").checked}`, "POST");
-  $("again").checked = false; $("progress").textContent = _("starting ...");
+  $("again").checked = false;
 });
 
 function minutes(s) { return s < 90 ? `${Math.max(1, Math.round(s))} s` : `${Math.round(s / 60)} min`; }
@@ -163,11 +167,12 @@ const um = v => v == null ? "–" : fixed(v, 2);
 const verdict = quietly(async run => {
   if (!run || shownRun === run.number + run.ended) return;
   shownRun = run.number + run.ended;
-  const shown = (await api(`api/runs/${run.number}`)).results, { compare, fit } = shown, models = (fit || {}).models || [];
+  const told = await api(`api/runs/${run.number}`), shown = told.results, { compare, fit } = shown, models = (fit || {}).models || [];
+  Object.assign(WORDS, told.words);
   const head = [_("deviation"), _("method"), _("verdict"), _("RMS with compensation [um]"), _("RMS without [um]"), _("why")];
   const method = target => [...((compare || {}).recommended || []).map(r => ({ ...r, model: r.written })), ...((compare || {}).results || [])].find(r => r.target === target && r.model);
   const line = m => [m.target, (method(m.target) || { model: m.family }).model, m.verdict, um(m.unseen_rms_um), um(m.none_rms_um), m.reason];
-  const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", k === 2 ? _(String(c)) : String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
+  const body = models.map(line).map(cells => element("tr", "", "", ...cells.map((c, k) => element("td", k === 2 || k === 5 ? _(String(c ?? "")) : String(c ?? ""), k === 2 ? String(c) : k === 3 || k === 4 ? "n" : ""))));
   $("verdict").replaceChildren(element("h2", _("Result of run {number}, on unseen data", { number: run.number })),
     scrolling(element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
     element("p", "", "", link(run, "comparison.html", _("All methods, with curves and reasons")), " · ", link(run, "check.html", _("Check of the data")), " · ", link(run, "model.json", _("Model file"))));
@@ -189,16 +194,26 @@ function runsTable(runs) {
 function deployForm(run) {
   if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
   const steps = run.steps.filter(s => s.name === "export");
-  $("package").replaceChildren(...steps.map(s => element("article", "", "card", element("h2", s.files.length ? s.files[0].split("/")[0] : _("nothing exported")), element("p", s.text), element("ul", "", "", ...s.files.map(f => element("li", "", "", link(run, f, f.split("/")[1])))))));
+  $("exported").textContent = _("Exported are the models of run {number}: {text}", { number: run.number, text: run.steps.filter(s => s.name === "compare").map(s => s.text).join(" ") });
+  $("package").replaceChildren(...steps.map(s => packageCard(run, s)));
   if (!steps.length) $("package").append(element("p", _("Nothing is exported yet."), "quiet"));
+}
+
+function packageCard(run, step) {
+  const { files, text } = step, folder = files.length ? files[0].split("/")[0] : "", guides = files.filter(f => f.endsWith(".md"));
+  if (!folder) return element("article", "", "card", element("h2", _("nothing exported")), element("p", text));
+  const whole = element("a", _("Download the package ({n} files, ZIP)", { n: files.length }), "main"), all = element("ul", "", "", ...files.map(f => element("li", "", "", link(run, f, f.split("/")[1]))));
+  whole.href = `api/runs/${run.number}/zip/${encodeURIComponent(folder)}`; whole.download = `${folder}.zip`;
+  return element("article", "", "card", element("h2", folder), element("p", text), element("p", "", "", whole), element("p", `${_("In the folder")} ${state.folder}/runs/${run.number}/${folder}`, "quiet"),
+    ...guides.map(f => element("p", _("Read first:") + " ", "", link(run, f, f.split("/")[1]))), element("details", "", "", element("summary", _("All files")), all));
 }
 
 const exportModels = quietly(async event => {
   event.preventDefault();
+  $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
   const [to, dialect] = $("to").value.split(" ");
   await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
   await api("api/runs", "POST");
-  $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
 });
 
 // -- the page ----------------------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 "use strict";
 // Two runs side by side, of this project or of another one: results by deviation and method, and what was chosen differently.
 {
-  const fill = (select, runs, wanted) => select.replaceChildren(...runs.filter(r => r.state !== "running").reverse().map(r => new Option(`${r.number} (${r.began.slice(0, 10)})`, r.number, false, r.number === wanted)));
+  const fill = (select, runs, wanted) => select.replaceChildren(...runs.filter(r => !r.steps || r.steps.some(s => s.name === "fit")).reverse().map(r => new Option(`${r.number} (${r.began.slice(0, 10)})`, r.number, false, r.number === wanted)));
   const other = () => $("other").value.trim();
 
   document.addEventListener("state", () => {

@@ -19,7 +19,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const noise = robust && robust.noise_rms_um.normal, curves = button(_("curves"), quietly(() => plot(run, r)));
     curves.setAttribute("aria-label", _("curves of {model} for {target}", { model: r.model, target: r.target }));
     return [r.target, r.model + (written ? ` (${_("used")})` : ""), element("span", _(r.verdict), r.verdict.split(" ")[0]), r.rms_um, r.none_rms_um, worst ? _("{value} in {cycle}", { value: um(worst[1]), cycle: worst[0] }) : "–",
-      r.half_width_um == null ? "–" : _("± {width}, {share} % inside", { width: um(r.half_width_um), share: r.coverage_pct.toFixed(0) }), noise ? _("{value} with {noise} degC", { value: um(noise.mean), noise: robust.noise_degC.toLocaleString(LANGUAGE) }) : "–", lost ? _("{value} without {sensor}", { value: um(lost[1]), sensor: lost[0] }) : "–", String(r.n_sensors), r.rms_um == null ? r.reason : curves];
+      r.half_width_um == null ? "–" : _("± {width}, {share} % inside", { width: um(r.half_width_um), share: r.coverage_pct.toFixed(0) }), noise ? _("{value} with {noise} degC", { value: um(noise.mean), noise: robust.noise_degC.toLocaleString(LANGUAGE) }) : "–", lost ? _("{value} without {sensor}", { value: um(lost[1]), sensor: lost[0] }) : "–", String(r.n_sensors), r.rms_um == null ? _(r.reason) : curves];
   }
 
   async function plot(run, r) {  // measured, predicted, residual; a button for each cycle
