@@ -171,3 +171,16 @@ def test_the_model_file_carries_it_and_assess_tells_both(samples: Samples, recor
     assert cells["spindle speeds [1/min]"] == ("0, 1000, 1800, 2500, 3000", "0, 900, 2000")
     assert cells["cycles or files judged"] == ("4, 4 of them distinct", "2, 2 of them distinct")
     assert "copies count once" in shown.caption
+
+
+NAMES = ("Luft_C", "Raumtemperatur_C", "T_Halle", "Umgebung_C", "air"), ("Kühlluft_C", "Lufter_C", "t1_C", "repair_C")
+
+
+@pytest.mark.parametrize(("name", "there"), [(name, there) for there in (True, False) for name in NAMES[not there]])
+def test_surroundings_are_found_by_their_name(name: str, there: bool) -> None:
+    recording = small_machine()
+    last = recording.temperatures[-1]
+    channels = tuple(replace(c, name=name) if c is last else c for c in recording.channels)
+    table = recording.table.rename(columns={last.name: name})
+    found = replace(recording, channels=channels, table=table).ambient
+    assert (found is not None) == there
