@@ -112,7 +112,7 @@ def say(text: str, **values: Any) -> str:
 
     Parameters
     ----------
-    values : object
+    **values : object
         Values of its fields; without any, braces are characters like others.
     """
     text = " ".join(text.split())

@@ -85,7 +85,7 @@ def load_words(language: str, *places: str) -> dict[str, str]:
 
     Parameters
     ----------
-    places : str
+    *places : str
         Beginnings of the paths of the scripts.
     """
     if language == "en":
