@@ -36,8 +36,10 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     box.scrollIntoView({ block: "nearest" });
   }
 
+  const size = p => p.count ?? p.sensors.length;  // a method may use other sensors in each fold: the set names all of them
+
   function scatter(title, what, unit, points) {  // number of sensors against error; a point shows its set
-    const W = 440, H = 250, L = 52, B = 40, xs = points.map(p => p.sensors.length), top = Math.max(...points.map(p => p.error)) * 1.08 || 1, last = Math.max(...xs);
+    const W = 440, H = 250, L = 52, B = 40, xs = points.map(p => size(p)), top = Math.max(...points.map(p => p.error)) * 1.08 || 1, last = Math.max(...xs);
     const names = [...new Set(points.map(p => p.model))], svg = shape("svg", { viewBox: `0 0 ${W} ${H}`, class: "scatter", role: "group", "aria-label": title });
     const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", _("A click on a point shows its sensors."), "quiet");
     said.setAttribute("role", "status");
@@ -45,10 +47,10 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     for (let n = 1; n <= last; n += Math.ceil(last / 12)) svg.append(shape("text", { x: x(n), y: H - B + 24, "text-anchor": "middle" }, String(n)));
     svg.append(shape("text", { x: (W + L) / 2, y: H - 1, "text-anchor": "middle" }, what));
     for (const p of points) {
-      const dot = shape("circle", { cx: x(p.sensors.length) + 7 * (names.indexOf(p.model) - (names.length - 1) / 2) * Math.min(1, 6 / names.length), cy: y(p.error), r: 6, tabindex: 0, role: "button", "aria-pressed": "false", "aria-label": `${p.model}, ${p.sensors.length} ${what}: ${um(p.error)} ${unit}`, style: `fill: var(--c${names.indexOf(p.model) % 6})` });
+      const dot = shape("circle", { cx: x(size(p)) + 7 * (names.indexOf(p.model) - (names.length - 1) / 2) * Math.min(1, 6 / names.length), cy: y(p.error), r: 6, tabindex: 0, role: "button", "aria-pressed": "false", "aria-label": `${p.model}, ${size(p)} ${what}: ${um(p.error)} ${unit}`, style: `fill: var(--c${names.indexOf(p.model) % 6})` });
       const choose = () => {
         for (const other of svg.querySelectorAll("circle")) other.setAttribute("aria-pressed", other === dot);
-        said.textContent = `${p.model} (${p.sensors.length}): ${um(p.error)} ${unit}. ${p.sensors.join(", ") || _("no sensor")}`;
+        said.textContent = `${p.model} (${size(p)}): ${um(p.error)} ${unit}. ${p.sensors.join(", ") || _("no sensor")}`;
       };
       dot.addEventListener("click", choose);
       dot.addEventListener("keydown", e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); choose(); } });
@@ -64,7 +66,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
       const points = c.points.filter(p => p.error != null);
       if (points.length) box.append(scatter(_("Smallest sets of temperatures: {target}", { target: c.target }), _("temperature sensors"), c.unit, points));
     }
-    for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, error: r.rms_um }))));
+    for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, count: r.n_sensors, error: r.rms_um }))));
     const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
     return [element("h3", _("Number of sensors against error on unseen data")), ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
   }
