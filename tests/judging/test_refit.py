@@ -95,4 +95,5 @@ def test_the_demo_is_unproven_for_the_model_that_would_be_written() -> None:
     assert [a.word for a in compare(mine, ["dynamic"], judging, refit=False).overall()] == ["accepted"]
     (found,) = compare(mine, ["dynamic"], judging).overall()
     assert found.word == "unproven"
-    assert "with loss of spindle_rpm" in found.reason
+    assert "worse than no compensation" in found.reason
+    assert "t_z_bearing_C off by 1 degC" in found.reason
