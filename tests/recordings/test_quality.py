@@ -190,7 +190,7 @@ def test_missing_values_are_counted_and_located() -> None:
     (found,) = _check(values)
 
     assert (found.severity, found.kind) == ("warning", "missing values")
-    assert "101 values of 2000 (5.1%) missing, at most 100 consecutively, from row 600 (9000 s)" in found.text
+    assert "101 of 2000 values (5.1%) missing, at most 100 consecutively, from row 600 (9000 s)" in found.text
     assert [f.severity for f in _check(half)] == ["trouble"]
     assert [(f.severity, f.text[:19]) for f in _check(np.full(N, np.nan))] == [("trouble", "has no value at all")]
 
