@@ -135,7 +135,7 @@ def try_requests(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> d
     async def ask(_: object, task: Mapping[str, Any]) -> dict[str, Any]:
         given = json.loads(json.dumps(dict(task)))
         try:
-            found = worker._TASKS[given.pop("task")](**given)
+            found = worker.do_task(given)
         except InputError as e:
             raise InputError(str(e)) from e
         json.dumps(found, allow_nan=False)

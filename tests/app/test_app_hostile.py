@@ -72,7 +72,7 @@ def drop_many(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict
     async def ask(_: object, task: Mapping[str, Any]) -> dict[str, Any]:
         given = json.loads(json.dumps(dict(task)))
         try:
-            found: dict[str, Any] = json.loads(json.dumps(worker._TASKS[given.pop("task")](**given), allow_nan=False))
+            found: dict[str, Any] = json.loads(json.dumps(worker.do_task(given), allow_nan=False))
         except InputError as e:
             raise InputError(str(e)) from e
         return found

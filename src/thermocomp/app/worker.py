@@ -156,15 +156,26 @@ def _columns(table: FileTable, mapping: ColumnMapping) -> list[dict[str, Any]]:
 _TASKS: dict[str, Callable[..., dict[str, Any]]] = {"preview": preview, "settings": settings}
 
 
+def do_task(task: dict[str, Any]) -> dict[str, Any]:
+    """Return the result of a task: its name, the language of the texts, and the keywords of its function.
+
+    Raises
+    ------
+    InputError
+        The task is refused.
+    """
+    given = dict(task)
+    with use_language(given.pop("language", "") or "en"):
+        return _TASKS[given.pop("task")](**given)
+
+
 def main() -> None:
     """Do the task on standard input."""
     task = sys.stdin.read()
     if not task:  # the server has ended
         return
-    given = json.loads(task)
     try:
-        with use_language(given.pop("language", "") or "en"):
-            found = _TASKS[given.pop("task")](**given)
+        found = do_task(json.loads(task))
     except InputError as e:
         found = {"refused": str(e)}
     sys.stdout.write(json.dumps(found, allow_nan=False))
