@@ -125,6 +125,8 @@ def test_a_package_is_one_file(finished_project: Path, tmp_path: Path) -> None:
     package.mkdir()
     for name in ("a.st", "read me.md"):
         (package / name).write_text(f"content of {name}", encoding="utf-8")
+    (package / "outside.txt").symlink_to(folder / "project.toml")
+    (package.parent / "words.json").write_text("{}", encoding="utf-8")
 
     async def work(client: httpx.AsyncClient) -> None:
         answer = await client.get(f"/{TOKEN}/api/runs/1/zip/export-st")
@@ -134,6 +136,7 @@ def test_a_package_is_one_file(finished_project: Path, tmp_path: Path) -> None:
         for wrong in ("plan", "export-c99", "%2e%2e", "export-st%2F..%2F..", "run.json"):
             assert (await client.get(f"/{TOKEN}/api/runs/1/zip/{wrong}")).status_code in (404, 422), wrong
         assert (await client.get(f"/{TOKEN}/api/runs/2/zip/export-st")).status_code == 404
+        assert (await client.get(f"/{TOKEN}/api/runs/1")).status_code == 200
 
     asked_of(folder, work)
 

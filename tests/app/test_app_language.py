@@ -1,13 +1,12 @@
 """The page of a project in German: chosen, or as the browser asks; its reports too."""
 
-import asyncio
 import json
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from apppages import TOKEN, asked_of
 from browsing import chromium
 from pageserver import served
 from projects import small_project
@@ -16,24 +15,9 @@ from smallmachine import small_machine
 from thermocomp.app.project import Project
 from thermocomp.app.running import run_project
 from thermocomp.app.store import Store
-from thermocomp.app.web import make_app
+from thermocomp.core.exceptions import InputError
 from thermocomp.recordings.readers import recordings as files
 from thermocomp.report.language import load_words
-
-TOKEN = "a-secret-of-the-test"
-
-
-def ask(folder: Path, work: Callable[[httpx.AsyncClient], Awaitable[None]]) -> None:
-    async def whole() -> None:
-        store = Store(folder)
-        transport = httpx.ASGITransport(app=make_app(store, TOKEN))
-        async with httpx.AsyncClient(transport=transport, base_url=f"http://127.0.0.1/{TOKEN}") as client:
-            try:
-                await work(client)
-            finally:
-                await store.workers.close()
-
-    asyncio.run(whole())
 
 
 @pytest.mark.parametrize(
@@ -43,14 +27,28 @@ def ask(folder: Path, work: Callable[[httpx.AsyncClient], Awaitable[None]]) -> N
 def test_as_the_browser_asks_until_it_is_chosen(accepted: str, language: str, tmp_path: Path) -> None:
     async def work(client: httpx.AsyncClient) -> None:
         asked = {"Accept-Language": accepted}
-        page = (await client.get("/", headers=asked)).text
+        page = (await client.get(f"/{TOKEN}/", headers=asked)).text
         assert f'<html lang="{language}">' in page
         assert ("1 Dateien" in page) == (language == "de")
-        (await client.put("/api/settings", json={"language": "de"})).raise_for_status()
-        assert '<html lang="de">' in (await client.get("/", headers=asked)).text
-        assert (await client.put("/api/settings", json={"language": "xx"})).status_code == 422
+        (await client.put(f"/{TOKEN}/api/settings", json={"language": "de"})).raise_for_status()
+        assert '<html lang="de">' in (await client.get(f"/{TOKEN}/", headers=asked)).text
+        assert (await client.put(f"/{TOKEN}/api/settings", json={"language": "xx"})).status_code == 422
 
-    ask(small_project(tmp_path / "project"), work)
+    asked_of(small_project(tmp_path / "project"), work)
+
+
+@pytest.mark.parametrize("language", ['"xx"', "5", '["de"]', "{de = 1}"])
+def test_an_unknown_language_in_the_file_leaves_the_page_as_the_browser_asks(language: str, tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    file = folder / "project.toml"
+    file.write_text(f"language = {language}\n{file.read_text(encoding='utf-8')}", encoding="utf-8")
+
+    async def work(client: httpx.AsyncClient) -> None:
+        assert '<html lang="de">' in (await client.get(f"/{TOKEN}/", headers={"Accept-Language": "de"})).text
+
+    asked_of(folder, work)
+    with pytest.raises(InputError, match="language"):
+        Project(folder)
 
 
 def test_findings_are_in_the_language_of_the_project(tmp_path: Path) -> None:
@@ -63,13 +61,13 @@ def test_findings_are_in_the_language_of_the_project(tmp_path: Path) -> None:
         def told(found: dict[str, Any]) -> str:
             return " ".join(f["text"] for f in found["findings"])
 
-        found = (await client.put("/api/drop/stuck.csv", content=content)).json()
+        found = (await client.put(f"/{TOKEN}/api/drop/stuck.csv", content=content)).json()
         assert "29 of 800 values (3.6%) missing" in told(found)
-        await client.put("/api/settings", json={"language": "de"})
-        found = (await client.get(f"/api/recordings/{found['file']}")).json()
+        await client.put(f"/{TOKEN}/api/settings", json={"language": "de"})
+        found = (await client.get(f"/{TOKEN}/api/recordings/{found['file']}")).json()
         assert "29 von 800 Werten (3,6%) fehlen" in told(found)
 
-    ask(tmp_path / "project", work)
+    asked_of(tmp_path / "project", work)
 
 
 def test_the_reports_of_a_run_are_german(tmp_path: Path) -> None:

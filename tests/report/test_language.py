@@ -88,6 +88,7 @@ def test_values_are_written_as_the_language_does() -> None:
         assert write_cell(Message("rows")) == "Zeilen"
         assert write_cell("rows") == "rows"  # a channel of this name
         assert write_date("2024-03-05T14:30:00") == "05.03.24, 14:30"
+        assert write_date("on Monday") == "on Monday"
     assert translate(row) == row
     assert write_number("1.5") == "1.5"
     assert write_date("2024-03-05T14:30:00") == "2024-03-05T14:30:00"

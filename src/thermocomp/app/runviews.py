@@ -53,7 +53,7 @@ def view_runs(store: Store) -> APIRouter:
         if not name.startswith("export") or not folder.is_dir():
             raise HTTPException(404, f"run {number} has no package {name}")
         with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as whole:
-            for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+            for path in sorted(p for p in folder.rglob("*") if p.is_file() and not p.is_symlink()):
                 whole.write(path, f"{name}/{path.relative_to(folder).as_posix()}")
         return Response(content.getvalue(), media_type="application/zip")
 

@@ -18,6 +18,7 @@ from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import draft, write_text
 from thermocomp.files.plaintext import read_text
 from thermocomp.files.tomlfile import MOST
+from thermocomp.report.language import LANGUAGES
 
 NAME = "project.toml"
 #: largest file that can be dropped on the page [bytes]
@@ -78,7 +79,8 @@ class Store:
 
     def language(self) -> str:
         """Return the language that was chosen, else that of the browser which opened the page."""
-        return str(self.content().get("language", "")) or self.preferred
+        chosen = str(self.content().get("language", ""))
+        return chosen if chosen in LANGUAGES else self.preferred  # a file edited by hand may name any
 
     async def save(self, document: tomlkit.TOMLDocument) -> None:
         """Write settings after they have been validated.

@@ -173,7 +173,7 @@ def _results(store: Store) -> APIRouter:
         names = ("check", "compare", "fit", "assess", "sensors", "plan")
         found = {n: read_json(folder.path / f"{n}.json") for n in names}
         words = read_json(folder.path / "words.json")
-        return Json({**folder.read(), "results": found, "words": words["words"] if isinstance(words, dict) else {}})
+        return Json({**folder.read(), "results": found, "words": words.get("words") if isinstance(words, dict) else {}})
 
     @router.get("/runs/{number}/{name:path}")
     async def file(number: Annotated[int, InPath(ge=1, le=10**9)], name: str) -> FileResponse:

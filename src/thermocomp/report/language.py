@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from datetime import datetime
 from functools import cache
@@ -129,11 +129,12 @@ def write_cell(text: str) -> str:
 
 
 def write_date(text: str) -> str:
-    """Return a date and time of ISO 8601 as the language writes it; unchanged in English."""
+    """Return a date and time of ISO 8601 as the language writes it; unchanged in English, and other text."""
     language = find_language()
-    if language == "en":
-        return text
-    return str(format_datetime(datetime.fromisoformat(text), "short", locale=language))
+    if language != "en":
+        with suppress(ValueError):
+            return str(format_datetime(datetime.fromisoformat(text), "short", locale=language))
+    return text
 
 
 @cache
