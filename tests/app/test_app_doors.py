@@ -4,6 +4,7 @@ import asyncio
 import json
 import random
 import subprocess
+import sys
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
@@ -141,9 +142,11 @@ def try_requests(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> d
         json.dumps(found, allow_nan=False)
         return found
 
+    async def idle(_: Store, *, again: bool) -> None: ...
+
     monkeypatch.setattr(workers.Workers, "ask", ask)
     monkeypatch.setattr(workers.Workers, "warm_up", lambda _: None)
-    monkeypatch.setattr(Store, "start_run", lambda _, **__: None)
+    monkeypatch.setattr(Store, "start_run", idle)
     small_project(folder)
     done = new_run(folder)
     (done.path / "comparison.html").write_text("<p>", encoding="utf-8")
@@ -205,6 +208,32 @@ def test_one_run_at_a_time_and_what_it_refuses(tmp_path: Path, monkeypatch: pyte
         found = (await client.get(f"/{TOKEN}/api/project")).json()
         assert found["trouble"] == "error: files/drift.csv: the file is missing"
         assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 200
+
+    run(folder, work)
+
+
+def test_a_run_whose_result_is_there_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its process needs a moment more to end: the next order on the page is obeyed, not refused."""
+    folder, popen, monitored = small_project(tmp_path / "project"), subprocess.Popen, list[subprocess.Popen[bytes]]()
+
+    def start(_: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        monitored.append(
+            popen([sys.executable, "-c", f"import time; time.sleep({0.0 if monitored else 1.0})"], **options)
+        )
+        return monitored[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+
+    async def work(client: httpx.AsyncClient, _: Store) -> None:
+        assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 200
+        assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 422  # it has no result
+        done = new_run(folder)
+        with done.working():
+            pass
+        assert monitored[0].poll() is None
+        assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 200
+        assert monitored[0].poll() == 0
+        monitored[1].wait()
 
     run(folder, work)
 

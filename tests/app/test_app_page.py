@@ -278,6 +278,12 @@ def test_the_whole_way_in_a_browser(tmp_path: Path) -> None:
         page.reload()
         page.locator("#tab-deploy").click()
         page.select_option("#to", "linuxcnc")
+        page.route(
+            "**/api/runs", lambda route: route.fulfill(status=422, json={"detail": "refused for a test"}), times=1
+        )
+        page.locator("#target .main").press("Enter")
+        page.get_by_text("refused for a test").wait_for()
+        page.locator("#package", has_text="Nothing is exported yet.").wait_for()
         page.locator("#target .main").press("Enter")
         page.wait_for_selector("#package a.main", timeout=120_000)
         assert seen_by_axe(page) == []

@@ -13,6 +13,7 @@ from typing import Any
 
 import tomlkit
 
+from thermocomp.app.runfolder import runs_of
 from thermocomp.app.workers import Workers
 from thermocomp.core.exceptions import InputError
 from thermocomp.files.draft import draft, write_text
@@ -23,6 +24,8 @@ from thermocomp.report.language import LANGUAGES
 NAME = "project.toml"
 #: largest file that can be dropped on the page [bytes]
 LARGEST = 1_000_000_000
+#: maximum time that the process of a run takes to end after its result is written [s]
+ENDING = 30.0
 #: names of files that every system accepts
 _PLAIN = re.compile(r"[^\w .()+-]")
 _NEW = 'name = ""\n'
@@ -55,7 +58,7 @@ class Store:
         self.editing, self.workers = asyncio.Lock(), Workers()
         self.preferred = ""
         self._run: subprocess.Popen[bytes] | None = None
-        self._said = 0
+        self._said, self._before = 0, ""
         self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
         self.document()
 
@@ -242,7 +245,7 @@ class Store:
 
     # -- runs ----------------------------------------------------------------------------------------------------------
 
-    def start_run(self, *, again: bool) -> None:
+    async def start_run(self, *, again: bool) -> None:
         """Start a run of the project as a process that does not end with this one.
 
         Raises
@@ -250,14 +253,27 @@ class Store:
         InputError
             The last one that was started here has not ended.
         """
+        ended = self._last_end()
+        if self._run is not None and ended not in (
+            "",
+            self._before,
+        ):  # its result is there; the process is about to end
+            with suppress(subprocess.TimeoutExpired):
+                await asyncio.to_thread(self._run.wait, ENDING)
         if self._run is not None and self._run.poll() is None:
             raise InputError("a run is going on: stop it first, or wait for its end")
+        self._before = ended
         words = [sys.executable, "-X", "utf8", "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
         more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {"creationflags": _OWN_CONSOLE}
         nothing = subprocess.DEVNULL
         with (self.folder / "run.log").open("ab") as log:
             self._said = log.tell()
             self._run = subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=self.folder, **more)
+
+    def _last_end(self) -> str:
+        """Return number and time of the last run if it has ended."""
+        found = [run.read() for run in runs_of(self.folder)[-1:]]
+        return next((f"{run['number']} {run['ended']}" for run in found if run["state"] != "running"), "")
 
     def trouble(self) -> str:
         """Return what the last run that was started here said if it refused its input, maybe before it had a folder."""

@@ -159,7 +159,8 @@ def _results(store: Store) -> APIRouter:
     async def start(again: bool = False) -> Json:
         if not store.content().get("recordings"):
             raise InputError("the project has no recording: drop a file on the page first")
-        store.start_run(again=again)
+        async with store.editing:
+            await store.start_run(again=again)
         return Json({"started": True})
 
     @router.delete("/api/runs/{number}")

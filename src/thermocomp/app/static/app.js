@@ -142,8 +142,10 @@ const startRun = quietly(async event => {
   for (const [key, value, usual] of [["targets", targets, targets.length === all], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
   $("progress").replaceChildren(_("starting ..."));
   const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
-  await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
-  await api(`api/runs?again=${$("again").checked}`, "POST");
+  try {
+    await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
+    await api(`api/runs?again=${$("again").checked}`, "POST");
+  } catch (e) { render(state); throw e; }
   $("again").checked = false;
 });
 
@@ -212,8 +214,10 @@ const exportModels = quietly(async event => {
   event.preventDefault();
   $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
   const [to, dialect] = $("to").value.split(" ");
-  await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
-  await api("api/runs", "POST");
+  try {
+    await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
+    await api("api/runs", "POST");
+  } catch (e) { shownRun = ""; render(state); throw e; }  // refused: not "exporting ..." for ever
 });
 
 // -- the page ----------------------------------------------------------------------------------------------------------
