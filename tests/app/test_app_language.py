@@ -1,6 +1,7 @@
 """The page of a project in German: chosen, or as the browser asks; its reports too."""
 
 import json
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -73,10 +74,15 @@ def test_findings_are_in_the_language_of_the_project(tmp_path: Path) -> None:
 def test_the_reports_of_a_run_are_german(tmp_path: Path) -> None:
     folder = small_project(tmp_path / "project")
     project = folder / "project.toml"
-    project.write_text(f'language = "de"\n{project.read_text(encoding="utf-8")}', encoding="utf-8")
+    head = 'language = "de"\nname = "Fräse <b>4</b>"\n'
+    project.write_text(head + project.read_text(encoding="utf-8").replace('name = "Small machine"', ""), encoding="utf-8")
 
     run = run_project(Project(folder), lambda *_: None)
 
+    began = datetime.fromisoformat(run.folder.state.began).astimezone()
+    for name in ("check.html", "comparison.html"):
+        page = (run.folder.path / name).read_text(encoding="utf-8")
+        assert f"Fräse &lt;b&gt;4&lt;/b&gt; \N{MIDDLE DOT} {began:%d.%m.%y, %H:%M} \N{MIDDLE DOT} thermocomp" in page
     assert "Prüfung der Aufzeichnung" in (run.folder.path / "check.html").read_text(encoding="utf-8")
     report = (run.folder.path / "comparison.html").read_text(encoding="utf-8")
     assert "Fehler auf nicht gelernten Daten" in report

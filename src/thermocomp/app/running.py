@@ -25,6 +25,7 @@ from thermocomp.export.target import find_target
 from thermocomp.export.verbs import export
 from thermocomp.files.draft import write_text
 from thermocomp.recordings.recording import Recording
+from thermocomp.report.html import name_project
 from thermocomp.report.language import translate, use_language
 
 #: minimum time between two writes of the progress [s]
@@ -130,7 +131,11 @@ class ProjectRun:
         KeyboardInterrupt
             The run was stopped.
         """
-        with self.folder.working(), use_language(self.settings.language):
+        with (
+            self.folder.working(),
+            use_language(self.settings.language),
+            name_project(self.settings.name, self.folder.state.began),
+        ):
             if not self._has("fit"):
                 self._learn()
             if self.settings.export is not None:

@@ -1,6 +1,9 @@
 """Reports as offline HTML files: numbers are collected in a dict and rendered by a template."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from datetime import datetime
 from importlib.resources import files
 from typing import Any
 
@@ -29,6 +32,9 @@ from thermocomp.report.language import (
 )
 from thermocomp.report.layout import in_um, laid_out
 from thermocomp.report.summary import summarise
+
+#: name of the project whose pages are written, and the time of its run
+_project: ContextVar[tuple[str, ...]] = ContextVar("project", default=())
 
 
 def render(comparison: Comparison, recordings: Sequence[Recording], samples: Samples | None = None) -> str:
@@ -93,11 +99,23 @@ def render_choices(choices: Sequence[Choice], recordings: Sequence[Recording]) -
     )
 
 
+@contextmanager
+def name_project(name: str, began: str) -> Iterator[None]:
+    """State the name of a project and the time of its run in the head of each page; pages without are reproducible."""
+    local = datetime.fromisoformat(began).astimezone().isoformat(" ", "minutes")[:16]
+    before = _project.set(tuple(filter(None, (name, write_date(local)))))
+    try:
+        yield
+    finally:
+        _project.reset(before)
+
+
 def page(template: str, **content: Any) -> str:
     """Return an HTML page rendered from a template, with the version of thermocomp."""
     language = find_language()
     words = load_words(language, "report/static/")
-    return environment().get_template(template).render(version=__version__, language=language, words=words, **content)
+    made_by = " \N{MIDDLE DOT} ".join([*_project.get(), f"thermocomp {__version__}"])
+    return environment().get_template(template).render(made_by=made_by, language=language, words=words, **content)
 
 
 def _shown(value: Any) -> Any:
