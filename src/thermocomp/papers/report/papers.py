@@ -130,7 +130,7 @@ def render(studies: Sequence[Study], *, seed: int) -> str:
         environment()
         .get_template("papers.html")
         .render(
-            version=__version__,
+            made_by=f"thermocomp {__version__}",
             seed=seed,
             studies=studies,
             headlines=[headline(s) for s in studies],
