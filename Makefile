@@ -4,8 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 BENCH ?= .venv-bench
 PYTEST ?=
-# each test worker uses one core: more threads of linear algebra would compete with the others. A third of the time of a
-# worker is spent waiting for programs under test, so three workers suit two cores
+# each test worker uses one core: more threads of linear algebra would compete with the others
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .PHONY: help demo test test-long check mutants bench docs verdicts count clean
@@ -28,7 +27,7 @@ demo: $(VENV)/.study
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium clang gcc gcc-arm-none-eabi libc6-dev libclang-rt-dev libnewlib-arm-none-eabi linuxcnc-uspace \
 		linuxcnc-uspace-dev mosquitto qemu-system-arm
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 3 --dist loadfile $(PYTEST)
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST)
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh gcc libc6-dev linuxcnc-uspace mosquitto

@@ -137,7 +137,7 @@ def look(folder: Path, shown: Shown) -> None:
 
 
 @pytest.mark.parametrize(
-    "kills", [3, pytest.param(int(os.environ.get("THERMOCOMP_KILLS", "100")), marks=pytest.mark.long)]
+    "kills", [1, pytest.param(int(os.environ.get("THERMOCOMP_KILLS", "100")), marks=pytest.mark.long)]
 )
 def test_nothing_shown_as_saved_is_lost(tmp_path: Path, kills: int) -> None:
     folder, shown, lot = small_project(tmp_path / "project"), Shown(), random.Random(kills)

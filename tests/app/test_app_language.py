@@ -75,7 +75,9 @@ def test_the_reports_of_a_run_are_german(tmp_path: Path) -> None:
     folder = small_project(tmp_path / "project")
     project = folder / "project.toml"
     head = 'language = "de"\nname = "Fräse <b>4</b>"\n'
-    project.write_text(head + project.read_text(encoding="utf-8").replace('name = "Small machine"', ""), encoding="utf-8")
+    project.write_text(
+        head + project.read_text(encoding="utf-8").replace('name = "Small machine"', ""), encoding="utf-8"
+    )
 
     run = run_project(Project(folder), lambda *_: None)
 
