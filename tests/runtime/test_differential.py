@@ -121,7 +121,6 @@ def count_of(seed: int) -> int:
 
 
 @pytest.mark.parametrize("seed", ORDINARY)
-@pytest.mark.no_cover
 def test_the_program_is_numpy(seed: int) -> None:
     check(seed, MachineCode, count=count_of(seed))
     for compiler in COMPILERS if seed % 2 else COMPILERS[-1:]:

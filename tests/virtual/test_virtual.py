@@ -52,7 +52,6 @@ def test_the_promised_experiments_are_there() -> None:
 
 
 @pytest.mark.parametrize("experiment", sorted(PROMISED))
-@pytest.mark.no_cover
 def test_every_experiment_is_well_formed(experiment: str) -> None:
     for test in simulated(experiment):
         assert test.values.shape == (len(test.time), len(test.channels))

@@ -41,7 +41,8 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
     limits, values = compensator.limits, tables.values
     held = f"held for {limits.hold:g} s, then decays to 0 with a time constant of {limits.fade:g} s"
     found = [
-        "WHICH INPUTS COUNT MOST: change of the deviation, settled, when one input alone goes through its trained range"
+        "WHICH INPUTS COUNT MOST: change of the deviation, settled, when one input alone goes through its trained "
+        f"range, the largest {_MOST}; the correction has the opposite sign"
     ]
     for target, line in compensator.lines.items():
         total: dict[str, float] = {}
@@ -60,10 +61,12 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
         found.append(
             "A SENSOR THAT FAILS (fault above 0) is replaced by its prediction from the others. It is used again when "
             "it agrees with that, if it was missing (1) or unexplained (6); a temperature that was stepped (2), stuck "
-            "(3) or swapped (5) must be repaired, and is used again after a cold start or restart. A correction goes "
+            "(3) or swapped (5) must be repaired, and is used again after the next start from cold. A correction goes "
             "on if its model was judged to be better without the sensor than without compensation; otherwise it is "
-            f"{held}. Sensors that must not be missing: {'; '.join(needed)}. A speed that is wrong (4) holds the "
-            "corrections that depend on it; two sensors that fail at once can hold one, too."
+            f"{held}. Sensors that must not be missing: {'; '.join(needed)}. Of several that are missing, the losses "
+            "(effect) are added: beyond a number and a sum (most_lost, most_effect) the correction is held. A speed "
+            "that is off (4) holds the corrections that depend on it. At a start no speed may be missing: rejected = "
+            "2 until it is there."
         )
     else:
         found.append(
@@ -75,22 +78,36 @@ def explain(compensator: Compensator, tables: Tables, kept: str, cold: str, off:
         f"({kept}, at most {values['resumable'] / 3600.0:g} h without power; after more than {limits.hold:g} s the "
         "correction is taken at once, so call it before the axes are referenced); the machine was off, without such a "
         f"state, for more than {values['cold_after'] / 3600.0:.1f} h; a signal says that it is cold ({cold}); the "
-        "correction is re-zeroed by a measurement.",
+        f"correction is re-zeroed by a measurement.{_zeroing(compensator, tables)}",
         "BEYOND THE TRAINED RANGE inputs count as at its end (input_low, input_high: the range and "
         f"{_listed(f'{100.0 * m.support.margin:g} %' for m in compensator.models)} of it on either side); outside "
-        f"counts them. Then a model {_listed(_POLICIES[m.support.policy] for m in compensator.models)}. A value far "
-        f"beyond (room) {'counts as missing' if tables.sensors else 'is not used: rejected = 2'}.",
+        f"counts them. Then a model {_listed(_POLICIES[m.support.policy] for m in compensator.models)}. A "
+        f"temperature far beyond (room) {'counts as missing' if tables.sensors else 'is not used: rejected = 2'}.",
         "CALL IT every ten seconds, or with each new reading. " + _each_call(compensator),
-        f"TO SWITCH IT OFF: {off}; the correction is {held}. Do not write 0 in its place: the axis would jump.",
+        f"TO SWITCH IT OFF: {off}; the correction is {held}. Do not write 0 in its place: the axis would jump. To "
+        f"switch it on again: the true age; the correction moves to its value by at most {limits.rate:g} um/s. Limits "
+        "are options of the export: export again to change them.",
     ]
     return found
 
 
-def _each_call(compensator: Compensator) -> str:
+def _zeroing(compensator: Compensator, tables: Tables) -> str:
+    """Return what happens after a start from cold."""
+    zeroing = compensator.models[0].zeroing
+    if not tables.sizes["has_zero"]:
+        return ""
     return (
-        "A call without a newer reading (its age has grown) is rejected, and a correction moves by at most "
-        f"{compensator.limits.rate:g} um/s times the time since the previous call: many calls between two readings "
-        "make it slow."
+        f" After a start from cold the temperatures are averaged for {zeroing.at_rest:g} s with the spindle stopped, "
+        f"for {zeroing.otherwise:g} s otherwise; until then status is 0."
+    )
+
+
+def _each_call(compensator: Compensator) -> str:
+    limits = compensator.limits
+    return (
+        "A call without a newer reading (its age has grown) is rejected (status 2 meanwhile), and a correction moves "
+        f"by at most {limits.rate:g} um/s times the time since the previous call, of which {limits.reading_age:g} s "
+        "count: many calls between two readings make it slow."
     )
 
 
@@ -171,7 +188,8 @@ def describe(compensator: Compensator, tables: Tables, of: str = "") -> dict[str
         f"(computed, not applied), 5\nits reference is unknown (see below). `{of}rejected` is the reason why a reading "
         "was not used: 0 it was used, 1 its time, 2 a\nmissing or implausible value, "
         "3 temperatures that do not fit the start of a machine, 4 the source "
-        "has stopped: all temperatures\nrepeat, or the number of the reading does not change. "
+        "has stopped: all temperatures\nrepeat, or the number of the reading does not change; the first number after a "
+        "start is only noted. "
         f"`{of}outside` is the number of inputs beyond the trained range.",
         "sensors": sensors,
         "stopped": "A source that repeats its last values is found even if `age` is 0: each call with a valid age "

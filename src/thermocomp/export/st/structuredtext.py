@@ -47,11 +47,11 @@ INPUTS = {
         "LREAL",
         "optional: number of the reading, which changes with each new one, from 1; 0: they are not numbered",
     ),
-    "off_time": ("LREAL", "at the first call: time without power [s], 0 if it is unknown"),
+    "off_time": ("LREAL", "at the first call: time without power [s], from a clock that runs on; 0: unknown"),
     "cold": ("BOOL", "TRUE: the machine is cold; without effect once all references are known"),
     "restart": (
         "BOOL",
-        "rising edge: the present temperatures become the zero; the corrections continue without a jump",
+        "rising edge: the machine is cold: its temperatures become the zero, the corrections move to 0 at their rate",
     ),
     "rezero": ("BOOL", "rising edge: `correction[target]` continues from its value minus `remaining` [um]"),
     "target": ("DINT", "number of the correction that is re-zeroed"),
@@ -238,10 +238,13 @@ def _block(tables: Tables, name: str, scl: bool) -> SourceUnit:
     parts = [f"FUNCTION_BLOCK {quoted(name, scl)}", *(SCL if scl else [])]
     parts += [wrapped(f"(* Thermal compensation. value, by number: {comment('; '.join(numbered))} *)")]
     parts += [wrapped(f"(* correction [um], by number: {comment(_listed(tables.targets))} *)")]
-    if tables.sensors:  # in another order than the values
-        parts += [wrapped(f"(* fault, by number: {comment(_listed(tables.sensors))} *)")]
+    if tables.sensors:
+        order = "" if list(tables.sensors) == [c.name for c in tables.channels] else ", in another order than value"
+        parts += [wrapped(f"(* fault, by number{order}: {comment(_listed(tables.sensors))} *)")]
+    kept = used_in("s", " ".join(f"s.{safe(o)}" for o in outputs))
+    parts += [wrapped(f"(* {o}: {kept[o].about} *)") for o in outputs]
     parts += [wrapped(f"(* {i}: {about.replace('`', '')} *)") for i, (_, about) in INPUTS.items()]
-    parts += [f"(* kept: the retained state: a variable of type {name}_state with RETAIN or PERSISTENT *)"]
+    parts += [f"(* kept: the state that is retained (RETAIN, PERSISTENT, or Retain in SCL): a {name}_state *)"]
     parts += [
         section(
             "VAR_INPUT",

@@ -40,7 +40,10 @@ def sort(s: Kept, w: Work, t: Constants) -> None:
 
 @procedure
 def find_day(s: Kept, w: Work, t: Constants) -> None:
-    """Sort a column of offsets at a start, and leave that of the day in `middle`; see `core.starting.find_day`."""
+    """Sort a column of offsets at a start, and leave that of the day in `middle`.
+
+    As `core.starting.find_day`.
+    """
     w.middle = 0.0
     with when(w.rows > 0):
         sort(s, w, t)

@@ -83,7 +83,10 @@ def collect_offsets(s: Kept, w: Work, t: Constants, g: Whole, value: Callable[[W
 
 @procedure
 def suspect(s: Kept, w: Work, t: Constants) -> None:
-    """Find out whether the temperatures at the start are those of a warm machine; see `core.starting.seems_warm`."""
+    """Find out whether the temperatures at the start are those of a warm machine.
+
+    As `core.starting.seems_warm`.
+    """
     s.warm = False
     for g in each("g", t.SETS):
         collect_offsets(s, w, t, g, lambda c: s.zero_mean[c])
