@@ -94,7 +94,11 @@ int main(void)
             value[j] = (tc_real)given[k][j];
         }}
         happen(&s, (int)given[k][INPUTS + 3], given[k][INPUTS + 4]);
-        {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
+        if (given[k][INPUTS + 2] == 0.0) {{
+            {name}_step(&s, value, given[k][INPUTS], given[k][INPUTS + 1]);
+        }} else {{
+            {name}_step_counted(&s, value, given[k][INPUTS], given[k][INPUTS + 1], given[k][INPUTS + 2]);
+        }}
         wrong = s.rejected != told[k][TARGETS + SENSORS];
 #ifndef TC_FLOAT
         wrong |= s.outside != told[k][TARGETS + SENSORS + 1];
