@@ -61,6 +61,11 @@ def test_first_reading_is_the_zero() -> None:
     assert run(line(), [[23.0], [24.0], [22.0]], 1.0) == [0.0, 2.0, 0.0]  # 22.0 is clipped to the trained range
 
 
+def test_the_value_in_the_reference_state_is_added() -> None:
+    """C-03: Eq. 1."""
+    assert run(replace(line(), intercept=7.0), [[23.0], [24.0], [22.0]], 1.0) == [7.0, 9.0, 7.0]
+
+
 def test_a_fixed_reference_wins_over_the_first_reading() -> None:
     model = line()
     state = model.init(reference=[20.0])

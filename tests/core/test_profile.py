@@ -1,5 +1,7 @@
 """Profiles: Chen's polynomial, two coordinates, splines, borders."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -55,6 +57,18 @@ def test_two_coordinates() -> None:
     u, v = 2.4, -0.8
     expected = 2 + 3 * u - 4 * v**2 + 1.5 * u * v**2
     assert float(plane().at(np.array([x, y, 999.0]))) == pytest.approx(expected)
+
+
+def test_three_coordinates() -> None:
+    """C-06: alone, and as a product."""
+    exponents = ((1, 0, 0), (0, 2, 0), (0, 0, 1), (1, 1, 1))
+    profile = replace(
+        plane(), exponents=exponents, coefficients=(3.0, -4.0, 5.0, 7.0), centre=(100.0, 10.0, 20.0),
+        scale=(50.0, 200.0, 40.0), high=(400.0, 300.0, 500.0),
+    )  # fmt: skip
+    u, v, w = 2.4, -0.8, 1.5
+    said = profile.at(np.array([[220.0, -150.0, 80.0], [220.0, -150.0, 20.0]]))
+    assert said == pytest.approx([3 * u - 4 * v**2 + 5 * w + 7 * u * v * w, 3 * u - 4 * v**2])
 
 
 def test_a_spline_is_that_of_scipy() -> None:

@@ -202,6 +202,21 @@ def test_hidden_nodes_are_judged_on_cycles_left_out(samples: Samples) -> None:
         assert tried.cv_rms == pytest.approx(np.mean(left_out), rel=1e-6)
 
 
+def test_the_net_finds_the_drift_in_the_last_drift_and_the_speed() -> None:
+    """P-03: on cycles that it has not seen, also where the drift is not linear in the speed."""
+    rng, n = np.random.default_rng(4), 100
+    speed = np.concatenate([np.repeat(rng.choice([0.0, 1000.0, 2000.0, 3000.0], n // 10), 10) for _ in range(8)])
+    drift, cycle = np.zeros(8 * n), np.repeat(np.arange(8), n)
+    for k in range(8 * n):
+        drift[k] = (0.9 * drift[k - 1] if k % n else 0.0) + 4.0 * np.tanh(speed[k] / 1000.0)
+    X, dt, seen = speed[:, None], np.tile(clock(n), 8), np.where(cycle < 6, cycle, -1)
+
+    net = NetARX(time="routed", k=1, m=0, hidden=3, epochs=3000).fit(X, drift, dt=dt, cycle=seen)
+
+    left = (drift - net.predict(X, dt=dt))[cycle >= 6]
+    assert np.sqrt(np.mean(left**2)) < 0.15 * np.sqrt(np.mean(drift[cycle >= 6] ** 2))
+
+
 def test_measured_data(shared_data: Path) -> None:
     """E-P6: from the speed alone, ch1 becomes better than without compensation on the unseen cycle and ch3 worse."""
     data = pd.read_csv(shared_data / "fl_thermal" / "recording.csv")
