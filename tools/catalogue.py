@@ -65,10 +65,11 @@ def _texts_of(path: Path) -> Iterator[str]:
 
 
 def _messages(tree: ast.AST) -> Iterator[str]:
-    """Yield the templates of messages, and the headings of columns, in Python code."""
+    """Yield the templates of messages, the headings of columns and the labels of figures in Python code."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("Message", "Column"):
-            for part in ast.walk(node.args[0]) if node.args else ():
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
+            text, known = node.args[0], node.func.id in ("Message", "Column")
+            for part in ast.walk(text) if known else [text] if node.func.id == "translate" else []:
                 if isinstance(part, ast.Constant) and isinstance(part.value, str) and _is_text(part.value):
                     yield part.value
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, IntArray
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.samples import Samples
 
 #: length of a day [s]
@@ -129,14 +130,22 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
             "column or several files; or judge by time with --split 0.75/0.25"
         )
     blocks = join_short_cycles(samples.cycle, samples.test)
-    joined = f", {n - len(blocks)} of them too short: left out with the previous one" if 1 < len(blocks) < n else ""
+    joined = n - len(blocks) if 1 < len(blocks) < n else 0
     if len(blocks) == 1:  # all cycles joined: no training data would be left
         blocks = [np.array([k]) for k in range(n)]
     splits = []
     for block in blocks:
         mine = np.isin(samples.cycle, block)
         splits.append(Split(f"cycle {name_cycles(samples, block)}", ~mine, mine))
-    return Judging(f"leave one thermal cycle out ({n} cycles{joined})", tuple(splits))
+    if joined:
+        name = Message(
+            "leave one thermal cycle out ({n} cycles, {joined} of them too short: left out with the previous one)",
+            n=n,
+            joined=joined,
+        )
+    else:
+        name = Message("leave one thermal cycle out ({n} cycles)", n=n)
+    return Judging(name, tuple(splits))
 
 
 def leave_one_file_out(samples: Samples) -> Judging:
@@ -147,7 +156,7 @@ def leave_one_file_out(samples: Samples) -> Judging:
     splits = [
         Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
     ]
-    return Judging(f"leave one file out ({n} files)", tuple(splits))
+    return Judging(Message("leave one file out ({n} files)", n=n), tuple(splits))
 
 
 def leave_one_day_out(samples: Samples) -> Judging:
@@ -178,7 +187,7 @@ def leave_one_day_out(samples: Samples) -> Judging:
         mine = np.isin(day, block) & own
         more = f" and {len(block) - 1} more" if len(block) > 1 else ""
         splits.append(Split(f"day {names[block[0]]}{more}", ~mine, mine, whole=True))
-    return Judging(f"leave one day out ({len(blocks)} days)", tuple(splits))
+    return Judging(Message("leave one day out ({n} days)", n=len(blocks)), tuple(splits))
 
 
 def parse(text: str, samples: Samples) -> Judging:

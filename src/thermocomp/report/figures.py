@@ -8,10 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from thermocomp.core.arrays import FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.core.shown import shorten
 from thermocomp.judging.results import Assessment, Comparison
 from thermocomp.recordings.recording import Recording
 from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, log_ticks, name_ticks, svg
+from thermocomp.report.language import translate
 
 #: colour-blind safe palette (Okabe, Ito 2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -43,7 +45,7 @@ def measured(recording: Recording, points: int = POINTS) -> Drawn:
             values = recording.table[speed.name].to_numpy()
             ax.plot(*thin_points(hours, values, points), color=MEASURED, drawstyle="steps-post")
             ax.set_ylabel("1/min")
-            ax.set_title("spindle speed", pad=14)
+            ax.set_title(translate("spindle speed"), pad=14)
             room = float(hours[-1] - hours[0]) / LETTERS
             free = -np.inf
             for cycle in recording.cycles:
@@ -52,8 +54,8 @@ def measured(recording: Recording, points: int = POINTS) -> Drawn:
                     ax.text(start, 1.03, name, transform=ax.get_xaxis_transform(), fontsize=7, color="#666")
                     free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
-            (rest[0], recording.temperatures, "degC", "temperatures"),
-            (rest[1], recording.displacements, "um", "displacements: error of an uncompensated part"),
+            (rest[0], recording.temperatures, "degC", translate("temperatures")),
+            (rest[1], recording.displacements, "um", translate("displacements: error of an uncompensated part")),
         ):
             for k, c in enumerate(channels):
                 values = recording.table[c.name].to_numpy()
@@ -64,7 +66,7 @@ def measured(recording: Recording, points: int = POINTS) -> Drawn:
                 short = max(len(c.name) for c in channels) < 8
                 columns = 2 if short and len(channels) > 8 else 1
                 add_legend(ax, **BESIDE, ncols=columns, fontsize=7, handlelength=1.4)
-        rest[-1].set_xlabel("time [h]")
+        rest[-1].set_xlabel(translate("time [h]"))
         rest[-1].margins(x=0)
         return svg(figure)
 
@@ -87,13 +89,13 @@ def overview(comparison: Comparison) -> Drawn:
             name_ticks(ax.yaxis, models, fontsize=7)
             ax.set_ylim(len(models) - 0.4, -0.6)
             ax.set_ylabel(shorten(target, LONGEST), fontweight="bold", rotation=0, ha="right", va="center")
-        panels[0].plot([], [], color=NONE, lw=2.5, label="no compensation")
+        panels[0].plot([], [], color=NONE, lw=2.5, label=translate("no compensation"))
         for word, face in FILLED.items():
-            panels[0].plot([], [], "o", color=PREDICTED, mfc=face, label=word)
+            panels[0].plot([], [], "o", color=PREDICTED, mfc=face, label=translate(word))
         add_legend(figure, loc="outside upper right", ncols=4)
         for ax in panels:
             log_ticks(ax, "x")
-        panels[-1].set_xlabel("RMS of the residual on the judged rows [um]; smaller is better")
+        panels[-1].set_xlabel(translate("RMS of the residual on the judged rows [um]; smaller is better"))
         return svg(figure)
 
 
@@ -122,13 +124,15 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
                 *thin_points(hours, block.measured, points),
                 color=MEASURED,
                 lw=1.8,
-                label="measured = without compensation",
+                label=translate("measured = without compensation"),
             )
-            ax.plot(*thin_points(hours, block.predicted, points), color=PREDICTED, ls="--", label="predicted")
+            ax.plot(
+                *thin_points(hours, block.predicted, points), color=PREDICTED, ls="--", label=translate("predicted")
+            )
             ax.plot(
                 *thin_points(hours, block.measured - block.predicted, points),
                 color=RESIDUAL,
-                label="residual = with compensation",
+                label=translate("residual = with compensation"),
             )
             harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
             mark = "  HARMFUL" if harmful else ""
@@ -138,7 +142,7 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
                 fontsize=8,
                 color="#b00020" if harmful else "#222",
             )
-            ax.set_xlabel("time [h]")
+            ax.set_xlabel(translate("time [h]"))
         for ax in axes[:, 0]:
             ax.set_ylabel(f"{shorten(assessment.target.removesuffix('_um'), LONGEST)} [um]")
         add_legend(figure, loc="outside upper left", ncols=3)
@@ -182,16 +186,30 @@ def robustness(found: Sequence[Assessment]) -> Drawn:
                     bbox={"fc": "white", "ec": "none", "alpha": 0.85, "pad": 0.8},
                 )
         noise = found[0].robustness.noise if found[0].robustness else 0.0
-        ax.plot([], [], "o", color=PREDICTED, label="undisturbed")
-        ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=f"uniform noise +-{noise:g} degC")
-        ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=f"normal noise {noise:g} degC")
-        ax.plot([], [], "|", color=RESIDUAL, label="one sensor lost")
-        ax.plot([], [], "x", color=COLOURS[3], ms=4, label="one sensor off, undetected")
-        ax.plot([], [], color=NONE, lw=2.5, label="no compensation")
+        ax.plot([], [], "o", color=PREDICTED, label=translate("undisturbed"))
+        ax.plot(
+            [],
+            [],
+            "s",
+            color=COLOURS[2],
+            mfc="white",
+            label=translate(Message("uniform noise +-{noise:g} degC", noise=noise)),
+        )
+        ax.plot(
+            [],
+            [],
+            "D",
+            color=COLOURS[2],
+            mfc="white",
+            label=translate(Message("normal noise {noise:g} degC", noise=noise)),
+        )
+        ax.plot([], [], "|", color=RESIDUAL, label=translate("one sensor lost"))
+        ax.plot([], [], "x", color=COLOURS[3], ms=4, label=translate("one sensor off, undetected"))
+        ax.plot([], [], color=NONE, lw=2.5, label=translate("no compensation"))
         log_ticks(ax, "x")
         name_ticks(ax.yaxis, [f"{a.target}: {a.model}" for a in found])
         ax.set_ylim(len(found) - 0.5, -0.5)
-        ax.set_xlabel("RMS of the residual on the judged rows [um]")
+        ax.set_xlabel(translate("RMS of the residual on the judged rows [um]"))
         add_legend(ax, **BESIDE)
         return svg(figure)
 

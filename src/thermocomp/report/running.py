@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from thermocomp.core.messages import Message
 from thermocomp.judging.results import Assessment
 
 #: maximum number of models reported without gate and limits; the JSON output has all
@@ -12,16 +13,23 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
     """Return the effect of the compensator's gate and limits on the results."""
     judged = [a for a in assessments if a.alone is not None and not a.failure]
     limited = [a for a in judged if a.limits is not None]
-    lines = []
+    lines = list[str]()
     if limited and limited[0].limits is not None:
         off = [(a, a.metric("rms"), a.alone_metric("rms")) for a in limited]
         other = sorted((x for x in off if f"{x[1]:.2f}" != f"{x[2]:.2f}"), key=lambda x: -abs(x[2] - x[1]))
         shown = [f"{a.model} for {a.target} {alone:.2f} instead of {ran:.2f} um" for a, ran, alone in other[:MOST]]
         more = f", and smaller differences for {len(other) - MOST} more" if len(other) > MOST else ""
-        alone_words = f"{', '.join(shown)}{more}" if shown else "the same to 0.01 um"
+        limits = limited[0].limits
         lines.append(
-            "The judged corrections are those that the machine would apply, with the gate (check of each reading) and "
-            f"the limits ({limited[0].limits.in_words()}). RMS of the models alone: {alone_words}."
+            Message(
+                "The judged corrections are those that the machine would apply, with the gate (check of each reading) "
+                "and the limits (at most {magnitude:g} um, {rate:g} um/s, dead band {dead_band:g} um). "
+                "RMS of the models alone: {alone}.",
+                magnitude=limits.magnitude,
+                rate=limits.rate,
+                dead_band=limits.dead_band,
+                alone=f"{', '.join(shown)}{more}" if shown else Message("the same to 0.01 um"),
+            )
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
         lines.append(f"No limits for {', '.join(without)}: limits apply only to corrections in um.")
