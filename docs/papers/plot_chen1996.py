@@ -86,8 +86,15 @@ study.draw("fig10", "fig11", "fig12")
 # about effects that would be noise on his machine. So Eq. 5 is also imposed on the temperatures of the 810 rows, with
 # noise of the printed standard error: as printed, and multiplied so that the drift has the implied size. The
 # regression of the latter has the paper's R2, and yet other terms than Eq. 5 in most draws: a good fit does not
-# identify a law.  study.tell("C-18") study.show("Recovery of Eq. 5") assert abs(numbers["eq5_r2"] - 0.988) < 0.001
-# assert numbers["eq5_terms_as_printed"] < numbers["eq5_terms"] < 7  %% Position and temperature: the Y axis
+# identify a law.
+
+study.tell("C-18")
+study.show("Recovery of Eq. 5")
+assert abs(numbers["eq5_r2"] - 0.988) < 0.001
+assert numbers["eq5_terms_as_printed"] < numbers["eq5_terms"] < 7
+
+# %%
+# Position and temperature: the Y axis
 # ------------------------------------
 #
 # A laser measures the positioning error of Y along its travel, 51 times in a warm-up and cool-down. The cold profile is
