@@ -214,26 +214,25 @@ def test_one_run_at_a_time_and_what_it_refuses(tmp_path: Path, monkeypatch: pyte
 
 def test_a_run_whose_result_is_there_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its process needs a moment more to end: the next order on the page is obeyed, not refused."""
-    folder, popen, monitored = small_project(tmp_path / "project"), subprocess.Popen, list[subprocess.Popen[bytes]]()
+    folder, popen, started = small_project(tmp_path / "project"), subprocess.Popen, list[subprocess.Popen[bytes]]()
 
     def start(_: list[str], **options: Any) -> subprocess.Popen[bytes]:
-        monitored.append(
-            popen([sys.executable, "-c", f"import time; time.sleep({0.0 if monitored else 1.0})"], **options)
-        )
-        return monitored[-1]
+        started.append(popen([sys.executable, "-c", "import time; time.sleep(3)"], **options))
+        return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
 
     async def work(client: httpx.AsyncClient, _: Store) -> None:
         assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 200
         assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 422  # it has no result
-        done = new_run(folder)
-        with done.working():
-            pass
-        assert monitored[0].poll() is None
-        assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 200
-        assert monitored[0].poll() == 0
-        monitored[1].wait()
+        with new_run(folder).working():
+            assert (await client.post(f"/{TOKEN}/api/runs")).status_code == 422
+        assert started[0].poll() is None
+        several = await asyncio.gather(*(client.post(f"/{TOKEN}/api/runs") for _ in range(3)))
+        assert sorted(answer.status_code for answer in several) == [200, 422, 422]
+        assert started[0].poll() == 0
+        assert len(started) == 2
+        started[1].wait()
 
     run(folder, work)
 

@@ -254,10 +254,7 @@ class Store:
             The last one that was started here has not ended.
         """
         ended = self._last_end()
-        if self._run is not None and ended not in (
-            "",
-            self._before,
-        ):  # its result is there; the process is about to end
+        if self._run is not None and ended and ended != self._before:  # its result is there: it is about to end
             with suppress(subprocess.TimeoutExpired):
                 await asyncio.to_thread(self._run.wait, ENDING)
         if self._run is not None and self._run.poll() is None:
@@ -273,7 +270,7 @@ class Store:
     def _last_end(self) -> str:
         """Return number and time of the last run if it has ended."""
         found = [run.read() for run in runs_of(self.folder)[-1:]]
-        return next((f"{run['number']} {run['ended']}" for run in found if run["state"] != "running"), "")
+        return next((f"{run['number']} {run['ended']}" for run in found if run["ended"]), "")
 
     def trouble(self) -> str:
         """Return what the last run that was started here said if it refused its input, maybe before it had a folder."""
