@@ -344,10 +344,10 @@ def _switch(story: _Story) -> None:
     for _ in range(3):  # nothing usable for too long after a power-up: the axes may be in use
         story.add(story.machine.run(0.6, story.pace), 0.6 * story.age, 2.0 * story.age)
     story.run(2, 0.2)
-    for share in (1.0, 0.5):  # of the time after which the axes may be in use
+    for share in (1.0, 0.5):  # of the time after which the axes may be in use; then a step is above the rate
         story.order(RETAINED, story.hold + 30.0)
         story.add(story.machine.run(0.6, share * story.age), share * story.age, 2.0 * story.age)
-        story.run(2, 0.2)
+        story.run(2, 0.2, dt=story.age / 6.0)
     for amount, calls in ((short, 2), (cold, 2), (1.01 * cold, 6), (math.inf, 2)):
         story.order(DAMAGED, amount)
         story.run(calls, 0.6)
