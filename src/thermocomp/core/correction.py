@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, SettingError
+from thermocomp.core.messages import Message
 
 #: scalar or array of positions
 _Position = TypeVar("_Position", float, NDArray[np.float64])
@@ -155,9 +156,14 @@ class Limits:
         if wrong:
             raise SettingError("; ".join(wrong))
 
-    def in_words(self) -> str:
+    def in_words(self) -> Message:
         """Return the limits as text, such as ``at most 500 um, 0.1 um/s, dead band 0 um``."""
-        return f"at most {self.magnitude:g} um, {self.rate:g} um/s, dead band {self.dead_band:g} um"
+        return Message(
+            "at most {magnitude:g} um, {rate:g} um/s, dead band {dead_band:g} um",
+            magnitude=self.magnitude,
+            rate=self.rate,
+            dead_band=self.dead_band,
+        )
 
 
 def _check_finite(what: str, offset: float, slope: float, reference_position: float) -> None:

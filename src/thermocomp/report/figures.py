@@ -187,22 +187,10 @@ def robustness(found: Sequence[Assessment]) -> Drawn:
                 )
         noise = found[0].robustness.noise if found[0].robustness else 0.0
         ax.plot([], [], "o", color=PREDICTED, label=translate("undisturbed"))
-        ax.plot(
-            [],
-            [],
-            "s",
-            color=COLOURS[2],
-            mfc="white",
-            label=translate(Message("uniform noise +-{noise:g} degC", noise=noise)),
-        )
-        ax.plot(
-            [],
-            [],
-            "D",
-            color=COLOURS[2],
-            mfc="white",
-            label=translate(Message("normal noise {noise:g} degC", noise=noise)),
-        )
+        uniform = translate(Message("uniform noise +-{noise:g} degC", noise=noise))
+        normal = translate(Message("normal noise {noise:g} degC", noise=noise))
+        ax.plot([], [], "s", color=COLOURS[2], mfc="white", label=uniform)
+        ax.plot([], [], "D", color=COLOURS[2], mfc="white", label=normal)
         ax.plot([], [], "|", color=RESIDUAL, label=translate("one sensor lost"))
         ax.plot([], [], "x", color=COLOURS[3], ms=4, label=translate("one sensor off, undetected"))
         ax.plot([], [], color=NONE, lw=2.5, label=translate("no compensation"))

@@ -19,15 +19,11 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
         other = sorted((x for x in off if f"{x[1]:.2f}" != f"{x[2]:.2f}"), key=lambda x: -abs(x[2] - x[1]))
         shown = [f"{a.model} for {a.target} {alone:.2f} instead of {ran:.2f} um" for a, ran, alone in other[:MOST]]
         more = f", and smaller differences for {len(other) - MOST} more" if len(other) > MOST else ""
-        limits = limited[0].limits
         lines.append(
             Message(
                 "The judged corrections are those that the machine would apply, with the gate (check of each reading) "
-                "and the limits (at most {magnitude:g} um, {rate:g} um/s, dead band {dead_band:g} um). "
-                "RMS of the models alone: {alone}.",
-                magnitude=limits.magnitude,
-                rate=limits.rate,
-                dead_band=limits.dead_band,
+                "and the limits ({limits}). RMS of the models alone: {alone}.",
+                limits=limited[0].limits.in_words(),
                 alone=f"{', '.join(shown)}{more}" if shown else Message("the same to 0.01 um"),
             )
         )
