@@ -26,7 +26,7 @@ PACKAGE = Path(thermocomp.__file__).parent
 SHELTERS = {"draft", "drafts", "scratch"}
 #: functions that write into a draft or a folder that they are given
 GIVEN = {
-    "app/livetrial.py": {"": 1},  # what a trial prints, only for its error
+    "app/livetrial.py": {"start": 1},  # what a trial prints, only for its error
     "app/runfolder.py": {"ask_to_stop": 1},  # an empty file that the run takes away
     "app/store.py": {"start_run": 1},  # what a run prints is added to its log
     "nc/linuxcnc/_rs274_child.py": {"run": 1},  # a process of its own, in the folder of its run
@@ -62,11 +62,14 @@ _WRITES |= {"to_csv", "to_parquet", "to_excel", "to_json", "to_pickle", "tofile"
 _WRITES |= {"copyfile", "copy2", "copytree", "mkstemp", "NamedTemporaryFile", "imsave"}
 
 
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+
+
 def functions(tree: ast.AST, name: str = "", *, sheltered: bool = False) -> Iterator[tuple[str, ast.Call, bool]]:
     """Yield every call, with the function it stands in, and whether a block around it shelters it."""
     for node in ast.iter_child_nodes(tree):
-        inside = node.name if isinstance(node, ast.FunctionDef) else name
-        here = sheltered and not isinstance(node, ast.FunctionDef)
+        inside = node.name if isinstance(node, _FUNCTIONS) else name
+        here = sheltered and not isinstance(node, _FUNCTIONS)
         if isinstance(node, ast.With):
             calls = [c.func for item in node.items for c in ast.walk(item.context_expr) if isinstance(c, ast.Call)]
             here |= any(isinstance(f, ast.Name) and f.id in SHELTERS for f in calls)
@@ -116,6 +119,7 @@ def test_nothing_else_writes() -> None:
         "def f(table, p): table.to_csv(p)",
         "def f(p, q): p.replace(q)",
         "def f(p):\n with draft(p) as q:\n  def g(): q.write_text('x')",
+        "def f(p):\n with draft(p) as q:\n  async def g(): q.write_text('x')",
     ],
 )
 def test_the_look_for_writers_sees_them(code: str) -> None:
