@@ -25,8 +25,8 @@ def finished_project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return finished(tmp_path_factory.mktemp("finished") / "project")
 
 
-def read(folder: Path, name: str) -> Any:
-    return json.loads((folder / "runs" / "1" / name).read_text(encoding="utf-8"))
+def read(folder: Path, name: str, run: int = 1) -> Any:
+    return json.loads((folder / "runs" / str(run) / name).read_text(encoding="utf-8"))
 
 
 def test_the_numbers_are_those_of_the_commands(finished_project: Path) -> None:
@@ -59,6 +59,32 @@ def test_evidence_in_a_browser(finished_project: Path) -> None:
         assert dots.count() == len(points)
         dots.nth(1).press("Enter")
         assert ", ".join(points[1]["sensors"]) in page.locator("#details .charts [role=status]").first.inner_text()
+
+
+def test_a_smaller_set_is_taken_for_the_next_run(finished_project: Path, tmp_path: Path) -> None:
+    folder = copy_of(finished_project, tmp_path / "mine")
+    (points,) = [c["points"] for c in read(folder, "sensors.json")["choices"]]
+    one = next(k for k, p in enumerate(points) if len(p["sensors"]) == 1)
+
+    def inputs() -> object:
+        return Project(folder).settings.compare.inputs
+
+    with opened(folder) as page:
+        page.wait_for_selector("#files .card canvas", timeout=120_000)
+        page.locator("#tab-judge").press("Enter")
+        assert page.locator("#inputs input:checked").count() == page.locator("#inputs input").count() == 4
+        page.locator("#details .charts .card").first.locator("circle").nth(one).press("Enter")
+        page.get_by_role("button", name="Choose these inputs for the next run").press("Enter")
+        assert page.evaluate("document.activeElement.id") == "start"
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#runs tbody tr:nth-child(2)")
+        assert inputs() == [*points[one]["sensors"], "spindle_rpm"]
+        page.wait_for_selector("#runs tbody tr:first-child td.done", timeout=120_000)
+    used = {s for r in read(folder, "compare.json", 2)["results"] for s in r["sensors"]}
+    assert used == {*points[one]["sensors"], "spindle_rpm"}
+    with opened(folder) as page:  # and is still chosen
+        page.wait_for_selector("#inputs input", state="attached", timeout=120_000)
+        assert page.locator("#inputs input:checked").count() == 2
 
 
 def test_two_runs_side_by_side(finished_project: Path, tmp_path: Path) -> None:

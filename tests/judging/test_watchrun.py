@@ -157,6 +157,22 @@ def test_wrong_speeds_are_found_alike(kind: str, machine: Callable[[], tuple[Wat
     assert machine is watched or kind == "zero, gone" or (1 if kind == "gone" else 4) in found
 
 
+def test_code_that_runs_long_is_optimised_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    watch, samples = six()
+    values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]].copy()
+    values[600:, 1], values[900:, 2] = values[600, 1], values[900:, 2] + 8.0
+    found = []
+    for spent, effort in ((0.0, 0), (machine._PATIENCE, 2)):
+        monkeypatch.setattr(machine, "_spent", spent)
+        with patch.object(machine, "_compiled", Mock(wraps=machine._compiled)) as compiled:
+            found.append(run_watch(watch, samples.time, values, samples.stands))
+        compiled.assert_called_once_with("believe_rows", effort)
+        assert machine._spent > spent
+    for quick, optimised in zip(*found, strict=True):
+        np.testing.assert_array_equal(quick, optimised)
+    assert found[0][1].any()
+
+
 def test_threads_that_begin_at_once_share_one_machine_code() -> None:
     """Of a second one, compiled at the same time, a thread would run what the other had discarded."""
     watch, samples = six()

@@ -86,7 +86,10 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
         ],
         "notes": [*recording.notes, *recording.changed],
         "targets": [c.name for c in recording.displacements],
-        "inputs": [c.name for c in (*recording.temperatures, *recording.of_quantity("spindle_speed"))],
+        "inputs": {  # and whether they are inputs of the models if none are named
+            **{c.name: True for c in recording.temperatures},
+            **{c.name: k == 0 for k, c in enumerate(recording.of_quantity("spindle_speed"))},
+        },
         "cycles": [{"name": c.name, "start_s": float(recording.time[c.start])} for c in recording.cycles],
         "origin_s": recording.origin,
         "panels": checks.panels(recording, findings, POINTS),

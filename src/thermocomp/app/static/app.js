@@ -124,10 +124,13 @@ function boxes(id, names, chosen, kind = "checkbox") {
   }));
 }
 
+const usualInputs = () => Object.assign({}, ...Object.values(seen).map(s => s.inputs || {}));
+
 function judgeForm() {  // only what is not yet shown: a choice of the user stays
   const compare = state.settings.compare || {}, names = [...new Set(Object.values(seen).flatMap(s => s.targets || []))];
-  const several = (state.settings.recordings || []).length > 1;
+  const several = (state.settings.recordings || []).length > 1, inputs = usualInputs(), own = [compare.inputs || []].flat(), known = [...new Set([...Object.keys(inputs), ...own])];
   if ([...document.querySelectorAll("#targets input")].map(i => i.value).join() !== names.join()) boxes("targets", names.map(n => [n, n]), compare.targets || names);
+  if ([...document.querySelectorAll("#inputs input")].map(i => i.value).join() !== known.join()) boxes("inputs", known.map(n => [n, n]), own.length ? own : known.filter(n => inputs[n]));
   if (!$("methods").children.length) boxes("methods", METHODS.map(n => [n, n]), compare.models || METHODS.slice(0, USUAL));
   if (!$("units").children.length) boxes("units", Object.entries(UNIT), [compare.leave_one || "cycle"], "radio");
   const byFile = document.querySelector("#units [value=file]");
@@ -137,9 +140,10 @@ const chosen = id => [...document.querySelectorAll(`#${id} input:checked`)].map(
 
 const startRun = quietly(async event => {
   event.preventDefault();
-  const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
-  if (!targets.length || !models.length) return alarm(_("Choose at least one deviation and one method."));
-  for (const [key, value, usual] of [["targets", targets, targets.length === all], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
+  const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), inputs = chosen("inputs"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
+  if (!targets.length || !models.length || !inputs.length) return alarm(_("Choose at least one deviation, one method and one input."));
+  const usualOnes = usualInputs(), asUsual = [...document.querySelectorAll("#inputs input")].every(i => i.checked === Boolean(usualOnes[i.value]));
+  for (const [key, value, usual] of [["targets", targets, targets.length === all], ["inputs", inputs, asUsual], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
   $("progress").replaceChildren(_("starting ..."));
   const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
   try {

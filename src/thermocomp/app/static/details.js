@@ -38,7 +38,14 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
 
   const size = p => p.count ?? p.sensors.length;  // a method may use other sensors in each fold: the set names all of them
 
-  function scatter(title, what, unit, points) {  // number of sensors against error; a point shows its set
+  function use(temperatures) {  // of the other inputs those that are chosen remain
+    const all = new Set(Object.values(seen).flatMap(s => (s.columns || []).filter(c => c.kind === "temperature").map(c => c.channel)));
+    for (const box of document.querySelectorAll("#inputs input")) if (all.has(box.value)) box.checked = temperatures.includes(box.value);
+    $("inputs").scrollIntoView({ block: "center" });
+    $("start").focus({ preventScroll: true });
+  }
+
+  function scatter(title, what, unit, points, sets = false) {  // number of sensors against error; a point shows its set
     const W = 440, H = 250, L = 52, B = 40, xs = points.map(p => size(p)), top = Math.max(...points.map(p => p.error)) * 1.08 || 1, last = Math.max(...xs);
     const names = [...new Set(points.map(p => p.model))], svg = shape("svg", { viewBox: `0 0 ${W} ${H}`, class: "scatter", role: "group", "aria-label": title });
     const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", _("A click on a point shows its sensors."), "quiet");
@@ -51,6 +58,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
       const choose = () => {
         for (const other of svg.querySelectorAll("circle")) other.setAttribute("aria-pressed", other === dot);
         said.textContent = `${p.model} (${size(p)}): ${um(p.error)} ${unit}. ${p.sensors.join(", ") || _("no sensor")}`;
+        if (sets && p.sensors.length) said.append(" ", button(_("Choose these inputs for the next run"), () => use(p.sensors)));
       };
       dot.addEventListener("click", choose);
       dot.addEventListener("keydown", e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); choose(); } });
@@ -64,7 +72,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const own = overall(results.compare).filter(r => r.rms_um != null), chosen = ((results.sensors || {}).choices || []), box = element("div", "", "charts");
     for (const c of chosen) {
       const points = c.points.filter(p => p.error != null);
-      if (points.length) box.append(scatter(_("Smallest sets of temperatures: {target}", { target: c.target }), _("temperature sensors"), c.unit, points));
+      if (points.length) box.append(scatter(_("Smallest sets of temperatures: {target}", { target: c.target }), _("temperature sensors"), c.unit, points, true));
     }
     for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, count: r.n_sensors, error: r.rms_um }))));
     const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
