@@ -1,9 +1,7 @@
 """Fixtures shared by all tests."""
 
 import os
-import time
-from collections import defaultdict
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -27,23 +25,6 @@ settings.register_profile("thorough", max_examples=200, deadline=None)
 # the same examples each time: a commit passes or it does not; new ones are looked for by `make test-long`
 settings.register_profile("ci", max_examples=50, deadline=None, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
-
-
-#: s for which the cases of one test are traced for coverage: further cases show hardly a new line, and tracing costs
-#: 60 % where compensators step
-TRACED = 3.0
-_spent: defaultdict[str, float] = defaultdict(float)
-
-
-@pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
-    """Stop tracing a test for coverage after some seconds of its cases."""
-    test = item.nodeid.partition("[")[0]
-    if _spent[test] > TRACED:
-        item.add_marker("no_cover")
-    start = time.monotonic()
-    yield
-    _spent[test] += time.monotonic() - start
 
 
 @pytest.fixture(scope="session")

@@ -49,7 +49,6 @@ def script(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> M
 
 
 @pytest.mark.parametrize("script", SMALLEST, indirect=True)
-@pytest.mark.no_cover
 def test_its_smallest_form_runs(script: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
     found = script.main([]) if script.__name__ == "bench_nc" else script.main()
     assert found in (0, 1)  # a goal may be missed: the smallest form measures nothing

@@ -88,7 +88,6 @@ LINES_OF = [
 
 
 @pytest.mark.parametrize("line", LINES_OF)
-@pytest.mark.no_cover
 def test_every_command_fits_a_screen_and_names_a_command_that_runs(
     line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -273,7 +273,6 @@ def test_a_constant_target_is_refused_not_a_crash(tmp_path: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("name", ["[/]_um", "z'[red]_um", "<b>z</b>_um", "z µ°_um"])
-@pytest.mark.no_cover
 def test_odd_names_are_printed_as_they_are(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = altered(tmp_path / "odd.csv", **{name: small_machine(dt=200.0).table["z_um"]})
     arguments = ["compare", str(path), "--target", name, "--models", "ols", "--jobs", "1"]

@@ -27,7 +27,6 @@ def drift(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("method", ["correlation", "grouping", "partial-f", "stepwise", "subsets", "ace", "pareto"])
-@pytest.mark.no_cover
 def test_every_method_for_people_and_programs(
     drift: Path, method: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

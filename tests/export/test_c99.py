@@ -97,7 +97,6 @@ def test_an_input_that_did_not_move_in_training_is_inside_where_it_was(flags: tu
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("flags", [SANITIZED, OPTIMISED, ("-DTC_FLOAT", *SANITIZED)])
-@pytest.mark.no_cover
 def test_the_readings_of_the_test_vectors_show_all_that_it_does(
     tmp_path: Path, flags: tuple[str, ...], compiler: str
 ) -> None:
@@ -202,7 +201,6 @@ def test_nothing_that_comes_in_moves_it_beyond_its_limits(
 
 
 @pytest.mark.parametrize("flags", [("-UTC_FLOAT",), ("-DTC_FLOAT",)])
-@pytest.mark.no_cover
 def test_the_program_of_the_page_compiles_and_runs(tmp_path: Path, flags: tuple[str, ...]) -> None:
     """As it stands on the page, with all warnings; its loop ends here after three calls."""
     texts = write_package(Compensator.of([watched_model("z_um")]), "mill", FACTS)

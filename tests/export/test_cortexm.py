@@ -49,7 +49,6 @@ def compile_for_the_board(folder: Path, code: Sequence[str], program: str) -> li
 
 
 @pytest.mark.parametrize("precision", [[], ["-DTC_FLOAT"]])
-@pytest.mark.no_cover
 def test_its_vectors_pass_on_a_cortex_m7(tmp_path: Path, precision: list[str]) -> None:
     compensator = Compensator.of([watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2))
     texts = write_package(compensator, "mill", Facts("model.json", "", "0", "2026-01-31"))

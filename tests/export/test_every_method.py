@@ -56,7 +56,6 @@ def test_every_method_is_documented() -> None:
 
 
 @pytest.mark.parametrize(("method", "speed", "watched", "target"), cases())
-@pytest.mark.no_cover
 def test_it_goes_there_or_is_refused_as_documented(
     fitted: Fitted,
     tmp_path: Path,

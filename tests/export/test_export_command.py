@@ -66,7 +66,6 @@ def test_an_error_along_an_axis_is_not_reduced(tmp_path: Path, capsys: pytest.Ca
 
 
 @pytest.mark.parametrize("dialect", ["codesys", "twincat", "scl", "iec"])
-@pytest.mark.no_cover
 def test_structured_text_in_every_dialect(tmp_path: Path, dialect: str) -> None:
     model = written(tmp_path, watched_model("z_um"))
     command = ["export", str(model), "--to", "st", "--dialect", dialect, "--date", "2026-01-31", "-o"]
@@ -233,7 +232,6 @@ def test_only_what_may_run_moves_anything(tmp_path: Path, capsys: pytest.Capture
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.no_cover
 def test_the_same_model_gives_the_same_files_and_nothing_is_overwritten(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -332,7 +330,6 @@ def test_a_whole_model_wants_nothing_of_the_training_side(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("to", "most"), [("linuxcnc", "2e+07"), ("beckhoff", "2e+08")])
-@pytest.mark.no_cover
 def test_a_correction_that_is_no_whole_number_of_32_bits(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], to: str, most: str
 ) -> None:
@@ -352,7 +349,6 @@ def test_a_correction_that_is_no_whole_number_of_32_bits(
         ["--magnitude", "1e9", "--rate", "1e9"],
     ],
 )
-@pytest.mark.no_cover
 def test_limits_at_the_ends_of_what_they_may_be(tmp_path: Path, limits: list[str]) -> None:
     model = written(tmp_path, watched_model("z_um"))
     assert run(["export", str(model), "--to", "c99", "-o", str(tmp_path), *limits]) == 0
@@ -362,7 +358,6 @@ def test_limits_at_the_ends_of_what_they_may_be(tmp_path: Path, limits: list[str
 
 
 @pytest.mark.parametrize("to", ["c99", "st", "linuxcnc", "siemens", "beckhoff"])
-@pytest.mark.no_cover
 def test_a_name_in_any_script_stands_as_it_is(tmp_path: Path, to: str) -> None:
     model = watched_model("z_um")
     assert model.watch is not None

@@ -27,7 +27,6 @@ def written(folder: Path, *models: ErrorModel) -> str:
 
 
 @pytest.mark.parametrize("to", MAIN)
-@pytest.mark.no_cover
 def test_the_same_inputs_give_the_same_files(to: str, tmp_path: Path) -> None:
     assert exported(tmp_path, growing_machine(6.0), to, method="dynamic") == 0
     first = {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}

@@ -76,7 +76,6 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Fitted:
 
 
 @pytest.mark.parametrize(("method", "speed"), [*cases()])
-@pytest.mark.no_cover
 def test_decisions_are_those_of_python_and_nothing_exceeds_a_limit(
     fitted: Fitted, tmp_path: Path, method: str, speed: bool
 ) -> None:

@@ -74,7 +74,6 @@ class Plant:
 
 
 @needs_halcompile
-@pytest.mark.no_cover
 def test_it_is_the_compensator_over_its_test_vectors(make: Make) -> None:
     models, limits = [watched_model("z_um"), watched_model("x_um")], Limits(dead_band=0.2)
     stand, compensator = make(*models, limits=limits), Compensator.of(models, limits)
@@ -186,7 +185,6 @@ def test_it_moves_only_while_an_external_offset_can_and_not_in_its_first_period(
 
 @needs_halcompile
 @pytest.mark.parametrize("how", ["silent", "nan", "bad", "off", "wild"])
-@pytest.mark.no_cover
 def test_without_a_usable_reading_it_holds_then_fades(make: Make, how: str) -> None:
     limits = Limits(rate=100.0, hold=120.0, fade=60.0, reading_age=10.0)
     stand = make(growing("z_um", 2.0), limits=limits)
@@ -214,7 +212,6 @@ def test_without_a_usable_reading_it_holds_then_fades(make: Make, how: str) -> N
 @needs_halcompile
 @pytest.mark.parametrize("pin", ["z-request", "unit"])
 @pytest.mark.parametrize("wild", [math.nan, math.inf, 1e300, 0.0])
-@pytest.mark.no_cover
 def test_what_the_controller_says_may_be_wild(make: Make, pin: str, wild: float) -> None:
     stand = make(growing("z_um", 2.0), limits=Limits(rate=100.0))
     stand["value-0"], stand["reading"] = 20.0, 1

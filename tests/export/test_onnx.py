@@ -233,7 +233,6 @@ def check_runs(folder: Path, compensator: Compensator) -> Any:
 
 
 @pytest.mark.parametrize("policy", ["clip", "hold"])
-@pytest.mark.no_cover
 def test_inside_a_compensator(tmp_path: Path, policy: Literal["clip", "hold"]) -> None:
     first = replace(watched_model("z_um"), support=Support(policy))
     shared: dict[str, Any] = {"zeroing": first.zeroing, "watch": first.watch}

@@ -56,7 +56,6 @@ def without_names_of_arrays(units: list[SourceUnit]) -> list[SourceUnit]:
     return found
 
 
-@pytest.mark.no_cover
 def test_it_does_the_same(plain: list[SourceUnit]) -> None:
     machine = Machine(without_names_of_arrays(plain))
     calls = 0
@@ -157,7 +156,6 @@ def test_the_project_holds_the_same(plain: list[SourceUnit]) -> None:
     assert array.attrib == {"lower": "0", "upper": "3"}
 
 
-@pytest.mark.no_cover
 def test_files(compensator: Compensator) -> None:
     files = write_package(compensator, "x", FACTS, "iec")
     assert sorted(files) == ["tc_x.md", "tc_x.st", "tc_x.xml", "tc_x_test.st"]

@@ -76,7 +76,6 @@ def at_the_bounds() -> ErrorModel:
     return replace(model, watch=watch, joint=joint)
 
 
-@pytest.mark.no_cover
 def test_numbers_at_their_bounds_stay_within_them() -> None:
     model = at_the_bounds()
     rounded = round_all(model, round_single)
@@ -163,7 +162,6 @@ def sixteen() -> Compensator:
 
 
 @needs_compiler
-@pytest.mark.no_cover
 def test_the_state_of_sixteen_sensors_with_a_watch_takes_20_kilobytes(tmp_path: Path) -> None:
     """No readings are stored: it fits into a small controller."""
     texts, sizes = cpackage.write_package(sixteen(), "x", FACTS), list[int]()

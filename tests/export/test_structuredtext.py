@@ -60,7 +60,6 @@ def machine(units: list[SourceUnit]) -> Machine:
     return Machine(units)
 
 
-@pytest.mark.no_cover
 def test_it_says_what_the_compensator_says(watched: Compensator) -> None:
     said = check_block(watched, make_readings(gather(watched)))
     assert set(said.status.ravel()) == {0, 1, 2, 3, 5}
@@ -94,7 +93,6 @@ def test_its_own_test_passes(watched: Compensator, units: list[SourceUnit]) -> N
         ("tc_x_tables", "hold : LREAL := 120.0", "hold : LREAL := 121.0"),
     ],
 )
-@pytest.mark.no_cover
 def test_its_own_test_finds_a_mistake(
     watched: Compensator, units: list[SourceUnit], block: str, was: str, becomes: str
 ) -> None:
@@ -246,7 +244,6 @@ def test_names_are_no_words_of_the_language(units: list[SourceUnit]) -> None:
     assert all(re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", n) for n in declared)
 
 
-@pytest.mark.no_cover
 def test_the_files_of_twincat_are_read_by_blark(tmp_path: Path, watched: Compensator) -> None:
     files = write_package(watched, "x", FACTS, "twincat")
     assert {Path(f).suffix for f in files} == {".TcPOU", ".TcDUT", ".md"}

@@ -92,7 +92,6 @@ def test_scenarios_show_every_state(compensator: Compensator) -> None:
     assert set(said.fault.ravel()) >= {WORDS.index(w) for w in ("good", "missing", "stepped", "stuck")}
 
 
-@pytest.mark.no_cover
 def test_readings_of_a_recording_follow_those_of_the_scenarios(tmp_path: Path, compensator: Compensator) -> None:
     tables, day = gather(compensator), failing(t1_C=(2.0, None))
     made, both = make_readings(tables), find_readings(tables, day)

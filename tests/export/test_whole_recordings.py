@@ -68,7 +68,6 @@ def methods() -> list[object]:
 
 @pytest.mark.parametrize("machine", ["demo", "fl_thermal"])
 @pytest.mark.parametrize("method", methods())
-@pytest.mark.no_cover
 def test_single_precision_is_within_a_twentieth_of_a_micrometre_or_said(
     machine: str, method: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
@@ -121,13 +120,11 @@ def test_the_vectors_of_a_model_whose_terms_cancel(
 
 @pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("method", ["averaged", "mra"])
-@pytest.mark.no_cover
 def test_fl_thermal_with_faults(shared_data: Path, tmp_path: Path, method: str, every: int) -> None:
     recording = read(shared_data / "fl_thermal" / "recording.csv")
     targets = [c.name for c in recording.channels if c.quantity == "displacement"][:2]
     check_recording(recording, targets, method, tmp_path, every)
 
 
-@pytest.mark.no_cover
 def test_the_virtual_machine_with_faults(tmp_path: Path) -> None:
     check_recording(virtual.record("demo")[0], ["z_um", "y1_um"], "averaged", tmp_path, every=3)

@@ -56,7 +56,6 @@ def test_the_files_that_are_damaged_are_sound(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(HOSTILE) - HEAVY))
-@pytest.mark.no_cover
 def test_a_hostile_file_is_read_or_refused(tmp_path: Path, name: str) -> None:
     ending, make = HOSTILE[name]
     path = tmp_path / f"hostile.{ending}"

@@ -37,7 +37,6 @@ def test_what_is_not_known_is_not_in_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("noise", [0.02, 1.0])
-@pytest.mark.no_cover
 def test_a_noisy_correction_is_told_before_it_is_used(
     noise: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -231,7 +231,6 @@ def told(writer: Writer, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.no_cover
 def test_a_full_disk_leaves_the_old_files(kind: str, small_disk: Path, tmp_path: Path) -> None:
     """From no room at all to almost enough: the error names the file, the old ones are whole, nothing stays."""
     writer = WRITERS[kind]

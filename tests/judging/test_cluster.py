@@ -49,7 +49,6 @@ def assert_same(one: Comparison, other: Comparison) -> None:
     assert one.recommended == other.recommended
 
 
-@pytest.mark.no_cover
 def test_a_comparison_is_the_same_as_here(running: DaskCluster) -> None:
     told: dict[str, list[str]] = {"there": [], "here": []}
     work = (small_machine(), "z_um", ["ols", "mra"])

@@ -52,7 +52,6 @@ def test_replay_of_the_frozen_model_equals_the_estimator(name: str, samples: Sam
 
 
 @pytest.mark.parametrize("name", METHOD_NAMES)
-@pytest.mark.no_cover
 def test_what_is_judged_is_never_learned_from(name: str, recording: Recording, samples: Samples) -> None:
     """Other displacements in the unseen block must not change the model: no leak, whatever the method."""
     split = splits.leave_one_cycle_out(samples).splits[1]

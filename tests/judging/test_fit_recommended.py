@@ -68,7 +68,6 @@ def test_with_none_accepted_the_least_bad_is_written_as_what_it_is() -> None:
         only.fit()
 
 
-@pytest.mark.no_cover
 def test_a_file_of_several_methods_is_taken_everywhere(mixed: FittedModels, tmp_path: Path) -> None:
     file, again = tmp_path / "model.json", small_machine((2200.0, 1200.0), seed=3, dt=200.0)
     mixed.save(file)

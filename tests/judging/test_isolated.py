@@ -75,7 +75,6 @@ def test_no_method_stops_the_others(
 
 
 @pytest.mark.parametrize("error", ERRORS, ids=lambda e: type(e).__name__)
-@pytest.mark.no_cover
 def test_no_error_stops_a_comparison(error: BaseException, one: Samples, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also in the choice among methods, and when what is accepted is fitted to all rows."""
     judging = splits.leave_one_cycle_out(one)

@@ -239,7 +239,6 @@ def test_another_model_with_as_many_sensors_is_named() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.no_cover
 def test_where_two_matter_two_are_recommended(seed: int) -> None:
     samples = stack([two_that_matter(seed)], ["x_um"], starts=COLD)
     for judging in (splits.leave_one_cycle_out(samples), splits.by_rows(samples, 0.75, 0.25)):
@@ -343,7 +342,6 @@ def test_um_and_urad_count_by_their_share(crowd: Samples) -> None:
     assert " um" not in " ".join((choice.reason, *choice.notes))
 
 
-@pytest.mark.no_cover
 def test_odd_recordings_are_chosen_from_all_the_same(crowd: Samples) -> None:
     """No speed, one temperature, dead ones beside it, one thermal cycle."""
     loco, halves = splits.leave_one_cycle_out(crowd), splits.by_rows(crowd, 0.5, 0.5)

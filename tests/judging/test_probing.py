@@ -153,7 +153,6 @@ def test_what_is_no_plan_of_probings_is_refused(odd: object) -> None:
     "error",
     [10.0, pytest.param(-10.0, marks=pytest.mark.long), 60.0, pytest.param(-400.0, marks=pytest.mark.long), 15_000.0],
 )
-@pytest.mark.no_cover
 def test_a_wrong_one_does_little_harm_however_often_it_comes(
     error: float, sound: bool, day: Recording, fitted: tc.ErrorModel
 ) -> None:

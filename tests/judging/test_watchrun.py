@@ -99,7 +99,6 @@ def test_planted_failures_are_found_alike(known: str) -> None:
 
 @pytest.mark.parametrize("kind", ["slow", "swapped", "gone", "stuck", "none"])
 @pytest.mark.parametrize("begin_at", [950, 1100])
-@pytest.mark.no_cover
 def test_failures_of_a_day_are_found_alike(kind: str, begin_at: int) -> None:
     watch, samples = six()
     values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]].copy()
@@ -141,7 +140,6 @@ def test_what_is_kept_after_the_first_readings_is_alike(rows: int) -> None:
 
 @pytest.mark.parametrize("machine", [watched, six])
 @pytest.mark.parametrize("kind", ["zero", "half", "stuck", "double", "gone", "per second", "zero, gone"])
-@pytest.mark.no_cover
 def test_wrong_speeds_are_found_alike(kind: str, machine: Callable[[], tuple[Watch, Samples]]) -> None:
     watch, samples = machine()
     values = samples.values[:, [[c.name for c in samples.inputs].index(i.name) for i in watch.inputs]].copy()

@@ -41,7 +41,6 @@ def between(shape: Callable[[FloatArray], FloatArray], n: int, noise: float, dra
 @pytest.mark.parametrize("noise", [0.05, 0.3, 0.5])
 @pytest.mark.parametrize("n", [5, 6, 7, 8, 10, 12])
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.no_cover
 def test_no_worse_than_straight_lines_from_station_to_station(shape: str, n: int, noise: float) -> None:
     """Chen's profile at 6 to 8 stations: the best of orders 0 to 4 leaves twice as much as straight lines do.
 

@@ -40,7 +40,6 @@ def tests() -> Samples:
 
 
 @pytest.mark.parametrize("name", METHODS)
-@pytest.mark.no_cover
 def test_cross_val_score_is_our_own_judging(name: str, tests: Samples) -> None:
     how = METHODS[name]
     estimator: Any = QUICK.get(name) or how.build(["spindle_rpm"])

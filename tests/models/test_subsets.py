@@ -44,7 +44,6 @@ def chain(n: int, p: int, seed: int) -> tuple[FloatArray, FloatArray]:
 
 @given(seed=st.integers(0, 10_000), p=st.integers(1, 6), intercept=st.booleans(), kind=st.integers(0, 4))
 @settings(max_examples=60, deadline=None)
-@pytest.mark.no_cover
 def test_both_routes_find_the_best_of_every_size(seed: int, p: int, intercept: bool, kind: int) -> None:
     rng = np.random.default_rng(seed)
     X, y = chain(60, p, seed)

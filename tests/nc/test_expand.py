@@ -136,7 +136,6 @@ START = "G17 G40 G80 G90 G94"
         ),
     ],
 )  # fmt: skip
-@pytest.mark.no_cover
 def test_plain_lines(plain: Plain, text: str, lines: list[str]) -> None:
     start = "%" if lines[0] == "%" else START
     found = plain(text)
@@ -177,7 +176,6 @@ def test_plain_lines(plain: Plain, text: str, lines: list[str]) -> None:
         ("G21 F100\nG0 X0 Y0\nG5.2 P1\nX5 Y5 P1\nX9 Y0 P2\nG5.3\nM2\n", 6, "splines"),
     ],
 )
-@pytest.mark.no_cover
 def test_refused(plain: Plain, tmp_path: Path, text: str, line: int, reason: str) -> None:
     with pytest.raises(ProgramError, match=reason) as caught:
         plain(text)

@@ -62,7 +62,6 @@ def test_a_loop_that_does_nothing_is_refused(refusal: Refusal, text: str, line: 
         "o<sub> call",
     ],
 )
-@pytest.mark.no_cover
 def test_what_moves_no_axis_keeps_no_loop_alive(refusal: Refusal, tmp_path: Path, inner: str) -> None:
     (tmp_path / "programs").mkdir()
     (tmp_path / "programs" / "sub.ngc").write_text(SUB.replace("G1 X5 F100", "#2=1"), encoding="ascii")

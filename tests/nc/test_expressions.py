@@ -241,7 +241,6 @@ def expression(random: Random, depth: int) -> str:
 
 @pytest.mark.usefixtures("interpreter")
 @pytest.mark.parametrize("seed", range(5))
-@pytest.mark.no_cover
 def test_values_are_those_of_the_interpreter(seed: int) -> None:
     random, parameters = Random(seed), Parameters(values=KNOWN)
     texts = [text for _ in range(400) if len(text := expression(random, 3)) < 200]  # a line has at most 255 characters

@@ -111,7 +111,6 @@ def some_controller(seed: int) -> rs274.Stored:
 @pytest.mark.usefixtures("interpreter")
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
-@pytest.mark.no_cover
 def test_linuxcnc_moves_by_what_was_asked_for(path: Path, way: str, tmp_path: Path) -> None:
     try:
         trial = revise(path, tmp_path, way)

@@ -30,7 +30,6 @@ def proved(trial: Trial, seen: list[int] | None = None) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
-@pytest.mark.no_cover
 def test_each_revised_program_is_proved_in_eight_states(path: Path, tmp_path: Path) -> None:
     if path.name in REFUSED:
         return
@@ -42,7 +41,6 @@ def test_each_revised_program_is_proved_in_eight_states(path: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("seed", [*range(10), *(pytest.param(n, marks=pytest.mark.long) for n in range(10, 300))])
-@pytest.mark.no_cover
 def test_random_programs_are_proved(seed: int, tmp_path: Path) -> None:
     path = tmp_path / "program.nc"
     path.write_text(program(seed), "ascii")

@@ -80,7 +80,6 @@ def named(way: str, feature: Feature) -> int:
 
 @pytest.mark.parametrize("way", ["coordinates", "offset"])
 @pytest.mark.parametrize("feature", FEATURES, ids=[f.name for f in FEATURES])
-@pytest.mark.no_cover
 def test_a_feature_is_revised_rightly_or_refused(feature: Feature, way: str, tmp_path: Path) -> None:
     path = program(tmp_path, feature)
     for drift, every in ((Growing(), 5.0), (Growing(rate=(1, 1, 2)), None)):

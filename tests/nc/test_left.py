@@ -174,7 +174,6 @@ class Fixed(Growing):
 
 @pytest.mark.parametrize("shift", [22.1, 0.1, 3.3, 12.7, -5.1, 31.9, 17.0, 8.2])
 @pytest.mark.parametrize("hole", ["Z-22 R2 Q4", "Z-18. R2. Q5.", "Z-6 R1 Q0.7", "Z-20.2 R0.4 Q2.06"])
-@pytest.mark.no_cover
 def test_a_shift_does_not_make_another_peck(hole: str, shift: float, tmp_path: Path) -> None:
     """Where Q divides the depth, rounded numbers may leave a rest of 1e-15 mm, which is a peck."""
     trial = tried(tmp_path, f"G98 G83 X1 {hole}\nX2\nG80\nG0 Z10\n", Fixed(-shift))

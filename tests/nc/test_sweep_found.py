@@ -24,7 +24,6 @@ FOUND = {
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", FOUND)
-@pytest.mark.no_cover
 def test_it_is_revised_rightly(name: str, way: str, tmp_path: Path) -> None:
     found = outcome(1, f"S3000 M3\n{FOUND[name]}\nM2\n", way, "Z", tmp_path, proof=True)
     if way == "offset" and "L20" in FOUND[name]:

@@ -371,7 +371,6 @@ TEXTS = [
 
 @pytest.mark.usefixtures("interpreter")
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.no_cover
 def test_the_interpreter_reads_the_same(seed: int) -> None:
     random = Random(seed)
     texts = [

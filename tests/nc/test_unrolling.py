@@ -316,7 +316,6 @@ def test_a_loop_without_end_is_refused_where_it_begins(
     assert "no end" in caught.value.reason
 
 
-@pytest.mark.no_cover
 def test_so_many_lines_are_run() -> None:
     with pytest.raises(ProgramError, match="has run more than 220,000 lines that would be written"):
         for _ in unroll(split_lines("#1=9\nWHILE[#1GT0]DO1\n#1=#1+1\nX#1\nEND1\nM30\n"), FANUC):
@@ -341,7 +340,6 @@ def test_a_long_loop_is_written_out() -> None:
     assert sum(text.startswith("G1") for text, _ in lines) == 200_000
 
 
-@pytest.mark.no_cover
 def test_lines_that_move_nothing_are_written_if_they_end() -> None:
     """More than a loop may have, once each; and in loops with a move now and then."""
     loop = "#1=0\nWHILE[#1LT3]DO1\n#2=0\nWHILE[#2LT30000]DO2\n#2=#2+1\nEND2\nX#1\n#1=#1+1\nEND1\nM30\n"

@@ -46,7 +46,6 @@ def test_the_error_at_random_points_and_states() -> None:
     assert [c.holds for c in anywhere.claims(found())] == [True, True, True, False, None, None]
 
 
-@pytest.mark.no_cover
 def test_what_is_left_is_told_by_where_it_comes_from() -> None:
     for method, causes in quick().causes.items():
         assert sum(causes.values()) == pytest.approx(quick().errors[method], abs=0.05)

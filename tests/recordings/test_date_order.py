@@ -355,7 +355,6 @@ def drawn(draw: st.DrawFn) -> list[datetime]:
 
 @settings(deadline=None, max_examples=300)
 @given(drawn(), st.sampled_from((*SLASHES, *POINTS[:3])), st.sampled_from(CLOCKS))
-@pytest.mark.no_cover
 def test_no_duration_is_wrong(tmp_path_factory: pytest.TempPathFactory, found: list[datetime], f: str, c: str) -> None:
     path = written(tmp_path_factory.getbasetemp() / "drawn.csv", found, f + c)
     kept = [datetime.strptime(t.strftime(f + c), f + c) for t in found]  # to the minute, in some forms

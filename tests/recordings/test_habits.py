@@ -217,7 +217,6 @@ def test_dates_of_a_sheet(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("writer", "ending"), [(xlsx, "xlsx"), (ods, "ods")])
-@pytest.mark.no_cover
 def test_a_sheet_is_bounded(writer: Writer, ending: str, tmp_path: Path) -> None:
     path = tmp_path / f"wide.{ending}"
     writer(path, {"data": [*SHEET, [None] * 11_000 + [1.0]]})

@@ -56,7 +56,6 @@ def test_a_computed_temperature_is_named(how: str) -> None:
 
 
 @pytest.mark.parametrize("how", HOWS)
-@pytest.mark.no_cover
 def test_a_computed_temperature_is_named_on_a_real_machine(how: str, shared_data: Path) -> None:
     real = recordings.read(shared_data / "fl_thermal" / "recording.csv")
     assert not named(real)

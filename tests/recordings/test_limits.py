@@ -132,7 +132,6 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
                 read(tmp_path / name)
 
 
-@pytest.mark.no_cover
 def test_many_labels_and_columns_are_read(tmp_path: Path) -> None:
     path = tmp_path / "rec.csv"
     path.write_text("time_s,t1_C,cycle\n" + "".join(f"{k},20,c{k}\n" for k in range(200_000)))

@@ -387,7 +387,6 @@ def test_planted_outliers_of_a_printer_are_cut_and_no_other_value(
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.no_cover
 def test_planted_outliers_of_the_virtual_machine_are_cut_and_no_other_value(
     seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -47,7 +47,6 @@ def _trouble(recording: Recording) -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize(("experiment", "seed", "tests"), VIRTUAL)
-@pytest.mark.no_cover
 def test_the_virtual_machine_raises_no_trouble(experiment: str, seed: int, tests: int) -> None:
     recordings = virtual.record(experiment, seed=seed)
 

@@ -106,7 +106,6 @@ RUNNING = [str(60 * k) for k in range(len(INSTANTS))]
 
 
 @pytest.mark.parametrize(("what", "heading", "way"), FORMS, ids=[f"{w}-{h}" for w, h, _ in FORMS])
-@pytest.mark.no_cover
 def test_dates_that_the_time_does_not_know_are_refused(what: str, heading: str, way: Form, tmp_path: Path) -> None:
     path = write(tmp_path / "days.csv", heading, way, INSTANTS, RUNNING)
     if heading == "Date" and what in ("epoch", "compact"):

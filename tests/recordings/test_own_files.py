@@ -85,7 +85,6 @@ def _round_trip(recording: Recording, way: str, folder: Path) -> Recording:
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.no_cover
 def test_own_files_are_the_same_after_other_programs(tmp_path: Path, way: str) -> None:
     for kind in KINDS:
         for recording in simulated(kind)[-1:]:

@@ -229,7 +229,6 @@ def lag(drive: FloatArray, rows: float) -> FloatArray:
 
 @pytest.mark.parametrize(("um", "degc"), [(1.0, 0.1), (0.25, 0.0625), (0.1, 0.1), (0.01, 0.01), (5.0, 1.0)])
 @pytest.mark.parametrize("noise", [0.2, 0.5, 2.0])
-@pytest.mark.no_cover
 def test_the_same_profile_on_another_day_in_steps_of_an_instrument(um: float, degc: float, noise: float) -> None:
     """Same machine, same speeds, same weather, resolutions of dial gauges and PLCs; `noise` counts in resolutions."""
     rng = np.random.default_rng([int(um * 100), int(noise * 10)])

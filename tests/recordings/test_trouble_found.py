@@ -302,7 +302,6 @@ def _late(recording: Recording, names: Sequence[str], minutes: float) -> Recordi
 
 @pytest.mark.parametrize("minutes", [-20.0, 20.0, -12.0, 35.0])
 @pytest.mark.parametrize("which", ["demo", "real", "random"])
-@pytest.mark.no_cover
 def test_a_clock_that_is_off_is_told(which: str, minutes: float, request: pytest.FixtureRequest) -> None:
     recording = request.getfixturevalue(which) if which in ("demo", "real") else virtual.record(which)[0]
     temperatures, probes = (_names(recording, q) for q in ("temperature", "displacement"))

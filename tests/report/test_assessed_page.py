@@ -194,7 +194,6 @@ def test_the_page_needs_no_network_and_is_the_same_again(judged: Judged, recordi
     assert assessed.render(judged, [recording]) == page
 
 
-@pytest.mark.no_cover
 def test_the_command_and_python_write_the_same_page(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

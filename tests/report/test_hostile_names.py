@@ -71,7 +71,6 @@ def mixed(recording: Recording, first: int) -> Recording:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.no_cover
 def test_what_was_measured(name: str) -> None:
     recording = renamed(small_machine(dt=200.0), name)
     said = [t.strip() for t in texts(figures.measured(recording))]
@@ -106,7 +105,6 @@ def test_what_failed() -> None:
 
 
 @pytest.mark.parametrize("first", range(0, len(NAMES), 12))
-@pytest.mark.no_cover
 def test_a_whole_report(first: int) -> None:
     recording = mixed(small_machine(dt=200.0), first)
     speed = small_machine(dt=200.0).speed

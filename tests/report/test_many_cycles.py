@@ -12,7 +12,6 @@ from thermocomp.report.layout import Layout
 from thermocomp.report.printed import comparison
 
 
-@pytest.mark.no_cover
 def test_the_worst_cycles_and_the_median_of_all() -> None:
     samples = stack([small_machine([1000.0 + 60 * k for k in range(30)], dt=500.0)], ["z_um", "x_um"])
     found = compare(samples, ["ols", "ridge"], leave_one_cycle_out(samples), robustness=False)

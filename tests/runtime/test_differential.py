@@ -128,14 +128,12 @@ def test_the_program_is_numpy(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", seeds(IN_TEXT[0], LONG[0][:40]))
-@pytest.mark.no_cover
 def test_structured_text_is_numpy(seed: int) -> None:
     count = count_of(seed)
     check(seed, StructuredText, count=count, first=IN_TEXT[1] if seed in IN_TEXT[0] else None, within=1e-9)
 
 
 @pytest.mark.parametrize("seed", seeds((3, 5, 6, 11, 12), range(1200, 1240)))
-@pytest.mark.no_cover
 def test_repeated_temperatures_are_numpy(seed: int) -> None:
     """Some or all temperatures change, after intervals of any length, from the first readings on."""
     drawn, count, rng = draw_compensator(seed), 1500, np.random.default_rng((7, seed))

@@ -127,7 +127,6 @@ def first_stop(
 
 @pytest.mark.parametrize("times", [1, 10, 60])
 @pytest.mark.parametrize("names", [SIX, ()], ids=["six", "all"])
-@pytest.mark.no_cover
 def test_repeated_values_are_found_within_20_updates(names: tuple[str, ...], times: int) -> None:
     model = fitted(names)
     compensator = Compensator.of([model])
@@ -213,7 +212,6 @@ SENSORS = [(0.0, 0.0), (0.0625, 0.03), (0.1, 0.02), (0.5, 0.05)]
 
 @pytest.mark.parametrize("learned", ["averaged", "raw"])
 @pytest.mark.parametrize("sensor", [SENSORS[2], SENSORS[3]])
-@pytest.mark.no_cover
 def test_a_first_night_with_coarse_sensors_is_no_stop(
     tmp_path: Path, sensor: tuple[float, float], learned: str
 ) -> None:
@@ -240,7 +238,6 @@ def recorded(path: Path, names: Sequence[str]) -> list[dict[str, float]]:
 
 @pytest.mark.parametrize("times", [1, 10, pytest.param(60, marks=pytest.mark.long)])
 @pytest.mark.parametrize("resolution", [0.0, 0.1, 0.5, 1.0])
-@pytest.mark.no_cover
 def test_measured_raw_readings_are_no_stop(shared_data: Path, resolution: float, times: int) -> None:
     """Two printers that heat up and cool down, one of them without a sensor, and a machine tool; without a watch."""
     printers = {p: ["frame_t", "chamber_t", "bed_t", "he_t"] for p in sorted(shared_data.glob("voron_frame/*.csv"))}

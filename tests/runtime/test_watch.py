@@ -334,7 +334,6 @@ def test_a_coarse_sensor_at_rest_for_days_is_not_stuck(samples: Samples) -> None
 
 
 @pytest.mark.parametrize("minutes", [10, 30, 120])
-@pytest.mark.no_cover
 def test_a_value_that_is_the_same_after_a_gap_is_not_stuck(minutes: int) -> None:
     """Half an hour of readings, then none: of 0.02 degC, after a gap one in some reads the same by chance."""
     whole = stack(virtual.record("demo"), ["z_um"])
@@ -456,7 +455,6 @@ def test_a_sensor_with_a_wrong_gain_is_not_used_again_after_a_rest(watch: Watch,
 
 @pytest.mark.parametrize("physics", ["linear", "nonlinear"])
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0])
-@pytest.mark.no_cover
 def test_sensors_coarser_than_in_training_are_not_stuck_and_stuck_ones_are_found(physics: str, step: float) -> None:
     """All sensors, and each alone, are rounded in use: warm-up, cool-down and rest of all cycles; then one sticks."""
     whole = stack(virtual.record("demo", physics=physics), ["z_um"])  # type: ignore[arg-type]

@@ -63,7 +63,6 @@ def run(watch: Watch, samples: Samples, speed: FloatArray) -> tuple[FloatArray, 
 
 @pytest.mark.parametrize("few", [False, True], ids=["all", "six"])
 @pytest.mark.parametrize("physics", ["linear", "nonlinear"])
-@pytest.mark.no_cover
 def test_a_wrong_speed_is_named_within_20_minutes_of_running(physics: Physics, few: bool) -> None:
     """Of a quarter of the top speed and more; another seed than in the training, 20 instants of each fault."""
     watch, samples = fitted(physics, few), day(physics, 11, few)
