@@ -1,6 +1,7 @@
 """ErrorModel: init and step, support, both families."""
 
 from dataclasses import replace
+from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
@@ -257,3 +258,9 @@ def test_formula_and_sensors() -> None:
     assert lag().sensors == ("t", "n")
     assert line(slope=-2.0).formula() == "- 2 t"
     assert line(slope=0.0).sensors == ()
+
+
+@pytest.mark.parametrize("n", [1, 5])
+def test_the_terms_are_all_squares_and_products(n: int) -> None:
+    wanted = [(i,) for i in range(n)] + list(combinations_with_replacement(range(n), 2))
+    assert sorted(second_order_terms(n)) == sorted(wanted)

@@ -434,3 +434,13 @@ def test_half_window() -> None:
 def test_bad_settings_are_refused(estimator: TransformRegressor, message: str) -> None:
     with pytest.raises(InputError, match=message):
         estimator.fit(*bent())
+
+
+def test_the_estimator_smooths_over_2n_plus_1_ranks() -> None:
+    T, y = bent(n=60)
+    X = T.to_numpy()[:, :2]
+    m = ACE(half_window=10, max_sweeps=4).fit(X, y)
+    theta, _, psi, errors = kernel_fit(X, y, 10, 0.0, 4)
+    np.testing.assert_allclose(m.theta_.y, theta[np.argsort(y)], atol=1e-12)
+    np.testing.assert_allclose(m.errors_, errors)
+    assert m.psi_ == pytest.approx(psi)

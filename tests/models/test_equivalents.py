@@ -170,3 +170,16 @@ def test_number_of_sensors_that_is_enough() -> None:
     assert found.least_size(0.97) == 2
     assert replace(found, psi=np.full_like(found.psi, 0.75)).least_size(0.75) == 1  # at least so much
     assert replace(found, psi=np.array([*psi, psi[0] - 0.05])).least_size(0.99) is None
+
+
+def test_common_sets_are_equivalent_for_every_displacement() -> None:
+    psi = np.linspace(0.9, 0.98, 23)
+    same, worse = np.stack([psi, psi, psi]), np.stack([psi, psi - 0.01, psi])
+    for d in range(3):
+        each = [worse if k == d else same for k in range(3)]
+        assert equivalents(each, [(0,), (1,), (2,)]).common == ((0,), (2,))
+
+
+def test_the_best_set_has_the_greatest_sum() -> None:
+    psi = np.stack([np.repeat([0.90, 0.99], [12, 11]), np.full(23, 0.91)])
+    assert equivalents([psi], [(0,), (1,)]).best == (0,)

@@ -337,3 +337,14 @@ def test_contributions() -> None:
     np.testing.assert_allclose(found[:2], [np.corrcoef(X[:, k], y)[0, 1] for k in (0, 1)], atol=1e-11)
     assert np.isnan(found[2])
     assert np.isnan(contributions(X, np.ones(50))).all()  # nothing contributes to what does not change
+
+
+@pytest.mark.parametrize("absolute", [False, True])
+@pytest.mark.parametrize("threshold", [0.2, 0.6, 0.9])
+def test_temperatures_are_grouped_and_differences_represent(threshold: float, absolute: bool) -> None:
+    X, y = warm(np.random.default_rng(8), 40, 8, 3, 0.4)
+    X[:, 2] *= -1.0
+    m = CorrelationGrouping(threshold=threshold, absolute=absolute, reference=7).fit(X, y)
+    groups = twin.grouped(np.round(twin.correlation(X[:, :7]), 12), threshold, absolute)
+    assert [list(g) for g in m.groups_] == groups
+    assert list(m.representatives_) == twin.represented(X[:, :7] - X[:, 7:], y, groups, True)

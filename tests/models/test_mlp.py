@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from sklearn.utils.estimator_checks import parametrize_with_checks
 from thermocomp.core.exceptions import FitError, InputError
 from thermocomp.core.network import Network
 from thermocomp.files import modelfile
+from thermocomp.models import mlp
 from thermocomp.models.base import ThermalRegressor
 from thermocomp.models.mlp import PATIENCE, HiddenCount, SigmoidNet
 from thermocomp.models.mlp_sklearn import SklearnNet
@@ -341,3 +343,13 @@ def test_bad_settings_are_refused(setting: dict[str, Any], message: str) -> None
     X, y = drift(20)
     with pytest.raises(InputError, match=message):
         SigmoidNet(**setting).fit(X, y)
+
+
+def test_the_net_is_trained_at_falling_rates(monkeypatch: pytest.MonkeyPatch) -> None:
+    trained = Mock(wraps=train_net)
+    monkeypatch.setattr(mlp, "train_net", trained)
+    x = np.random.default_rng(0).normal(size=(20, 3))
+    SigmoidNet(hidden=2, n_epochs=6).fit(x, x[:, 0])
+    rates = trained.call_args.kwargs["rates"]
+    assert (rates[0], rates[-1]) == (0.5, pytest.approx(0.01))
+    assert (np.diff(rates) < 0).all()

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -355,3 +357,50 @@ def test_claims_on_slopes_can_fail(slopes: LearnedPositioning) -> None:
     lateral = find(chen1996_slope.judge(replace(slopes, fits=nothing)), "C-35", "dimensions")
     assert not lateral.holds
     assert lateral.ours.endswith("1.0 times")
+
+
+def test_each_drift_on_all_810_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = list[int]()
+    monkeypatch.setattr(chen1996_drift, "_train", lambda _, heat: rows.append(len(heat)))
+    found = chen1996_drift.learn(0, lambda _: None)
+    assert {*rows} == {810}
+    assert np.bincount(found.samples.test).tolist() == [162] * 5
+    rises = found.samples.only(chen1996_setup.TEMPERATURES).frame()
+    for j, (t, group) in enumerate(chen1996_setup.SUBGROUPS.items()):
+        again = SecondOrderRegression(differences=chen1996_setup.DIFFERENCES, subset=group)
+        again.fit(rises, found.samples.deviations[:, j])
+        assert found.regressions[t].n_rows_ == 810
+        assert dict(zip(found.regressions[t].terms_, found.regressions[t].coef_, strict=True)) == pytest.approx(
+            dict(zip(again.terms_, again.coef_, strict=True))
+        )
+        actions = [s.action for s in again.log_]
+        assert found.terms[t] == actions.count("enter") - actions.count("remove")
+    assert found.candidates == {"x": 20, "y": 35, "z": 20}
+
+
+def test_a_removed_term_is_not_counted() -> None:
+    log = [SimpleNamespace(action=a) for a in ("enter", "enter", "remove")]
+    regression: Any = SimpleNamespace(terms_=("T2",), candidates_=("T2", "T3"), log_=log)
+    found = LearnedDrift(None, dict.fromkeys(chen1996_setup.DRIFTS, regression), {}, {}, [], {})  # type: ignore[arg-type]
+    assert found.terms == dict.fromkeys(chen1996_setup.DRIFTS, 1)
+    assert found.candidates == dict.fromkeys(chen1996_setup.DRIFTS, 2)
+
+
+def test_another_day_is_another_day() -> None:
+    k1 = {"first": np.array([0.0, 1.0]), "second": np.array([0.0, 9.0])}
+    found: Any = SimpleNamespace(
+        other="second", learned="first", slope=k1.get, predicted=lambda _, day: k1[day] - len(day)
+    )
+    assert LearnedPositioning.left(found, None) == pytest.approx(6.0)  # type: ignore[arg-type]
+
+
+def test_the_paper_s_coefficients_stand_in_its_column(learned: LearnedDrift, slopes: LearnedPositioning) -> None:
+    powers = {f"y^{k}": 1e-3 * c for k, c in enumerate(chen1996_setup.EQ6.coef.tolist())}
+    for tables, heading, printed in (
+        (chen1996_drift.tables(learned), "Eq. 5", chen1996_drift.EQ5),
+        (chen1996_slope.tables(slopes), "Eq. 6", powers),
+        (chen1996_slope.tables(slopes), "Eq. 8", chen1996_setup.EQ8),
+    ):
+        (table,) = [t for t in tables if heading in t.header]
+        column = {row[0]: row[[*table.header].index(heading)] for row in table.rows}
+        assert {t: float(c) for t, c in column.items() if c} == pytest.approx(dict(printed), rel=1e-3, abs=5e-4)

@@ -277,3 +277,10 @@ def test_coefficients_are_those_of_the_law(within: float, verdict: str) -> None:
     found: Any = SimpleNamespace(recoveries={law.OURS: law.Recovery(EQ8, drawn)}, fit=fit)
     (claim,) = law.claims.judged("within", found)
     assert claim.verdict == verdict
+
+
+def test_representatives_of_the_participating_groups() -> None:
+    groups = ((6,), (8, 9, 10, 11), (12,), (7, 3), (4,), (1,), (5, 0), (2,))
+    g = SimpleNamespace(representatives_=(6, 9, 7, 12, 1, 4, 0, 2), groups_=groups, participating_=(0, 3, 5, 6))
+    (claim,) = hwang.claims.judged("representatives", SimpleNamespace(grouped=g))  # type: ignore[arg-type]
+    assert claim.ours == claim.paper == "T7 T8 T2 T1"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from thermocomp.virtual.centre import MachiningCentre
 from thermocomp.virtual.climate import STILL, Climate
 from thermocomp.virtual.datasets import EXPERIMENTS
 from thermocomp.virtual.experiments import SimulatedTest, simulate
@@ -74,3 +75,20 @@ def test_the_air_alone_moves_the_machine() -> None:
     still, usual = (growth(recorded("etve", climate)) for climate in (STILL, Climate()))
     assert np.ptp(usual) > 2.0
     assert np.ptp(still) < 0.1 * np.ptp(usual)
+
+
+def test_a_warm_spindle_grows() -> None:
+    """Towards the workpiece: the table's probe reads less distance."""
+    z = growth(recorded("chen1996"))
+    tip = recorded("wessel-fem").truth[:, 1]
+    assert z[STOP] < -10.0
+    assert tip.max() > 10.0
+
+
+def test_the_foot_of_the_column_sticks() -> None:
+    machine = MachiningCentre()
+    row = machine._observable("slide")
+    wish = np.array([3.0, 2.5, 0.0])
+    fields = np.tile(machine.model.one * 20.0, (3, 1)) + np.outer(wish / (row @ row), row)
+    _, slid = machine._truth(fields, np.zeros(3), 0.0)
+    assert slid == pytest.approx(1.0)

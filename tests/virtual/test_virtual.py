@@ -1,5 +1,6 @@
 """The experiments that come with the package have the papers' shapes, and look like measurements."""
 
+import math
 import re
 from functools import cache
 from itertools import combinations, groupby
@@ -291,3 +292,32 @@ def test_an_unknown_experiment_is_refused() -> None:
         record("qqqq")
     with pytest.raises(InputError, match=r"nowhere\.toml: no such protocol file"):
         record("nowhere.toml")
+
+
+def test_along_the_body_diagonal() -> None:
+    (plan,) = EXPERIMENTS["hwang"].programmes(0)
+    for segment in plan.segments:
+        feed = segment.drive.feed
+        assert feed == (feed[0],) * 3
+        assert math.hypot(*feed) == pytest.approx({0: 0, 600: 508, 3000: 2006}[int(segment.drive.speed)], abs=0.01)
+
+
+def test_cold_then_warm_then_stopped() -> None:
+    for plan, test in zip(EXPERIMENTS["chen1996"].programmes(0), simulated("chen1996"), strict=True):
+        start, warm, cool = plan.segments
+        assert [s.duration / HOUR for s in (start, warm, cool)] == [0.1, 6, 10]
+        assert any(warm.drive.feed)
+        for rest in (*plan.soak, start, cool):
+            assert (rest.drive.speed, rest.drive.feed) == (0, (0, 0, 0))
+        assert {"x1_um", "y1_um", "z_um"} <= {*names(test, "displacement")}
+
+
+def test_speeds_that_were_not_trained() -> None:
+    _, drawn = simulated("chen1996-new")
+    speeds = {*column(drawn, "spindle_rpm")} - {0.0}
+    assert len(speeds - {600, 1000, 1500, 2100, 2600}) > len(speeds) / 2
+
+
+def test_two_regimes_of_the_calculated_spindle() -> None:
+    reference, test = (column(t, "spindle_rpm") for t in simulated("wessel-fem"))
+    assert not {*reference} & {*test} - {0.0}

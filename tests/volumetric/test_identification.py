@@ -169,3 +169,14 @@ def test_it_is_least_squares() -> None:
     seen = [c.code for c, e in zip(COMPONENTS, design.T[: len(found.codes)], strict=False) if e[len(ENOUGH) :].any()]
     assert len(seen) > 0
     assert not effects_of_components(MILL, nest("bed", "tool"))[:, INDEX["XOX"]].any()
+
+
+def test_known_components_at_their_own_places() -> None:
+    values = planted(1, np.random.default_rng(2))[0]
+    known = np.zeros((len(ENOUGH), len(values)))
+    known[:, INDEX["EXX"]] = np.linspace(-30, 40, len(ENOUGH))
+    each = values + known
+    readings = np.array([measured([r], v[None])[0, 0] for r, v in zip(ENOUGH, each, strict=True)])
+    found = identify_components(MILL, ENOUGH, readings, known=known)
+    for code in THERMAL:
+        assert found[code] == pytest.approx(values[INDEX[code]], abs=0.1)
