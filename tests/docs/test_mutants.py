@@ -149,6 +149,12 @@ def test_a_change_that_only_raises_is_drawn_again(toy: Project, copy: Copy) -> N
     assert [gap.split(" ")[0] for gap in toy.gaps("A-01")] == ["no", "1"]
     toy.table["A-01"] = entry | {"code": {"toy.py::pay": "0"}, "tests": {}}
     assert [gap.split(" ")[0] for gap in toy.gaps("A-01")] == ["code", "tests"]
+    # a further test changes no kill; a kill by a test that is no longer named counts no more
+    toy.table["A-01"] = entry
+    toy.tests["A-01"] = ["test_toy.py::test_amount", "test_toy.py::test_sign"]
+    assert toy.gaps("A-01") == []
+    toy.tests["A-01"] = ["test_toy.py::test_sign"]
+    assert [gap.split(" ")[0] for gap in toy.gaps("A-01")] == ["tests"]
 
 
 def test_words_do_not_change_a_hash(toy: Project, tmp_path: Path) -> None:

@@ -124,3 +124,20 @@ def test_tables_name_all_32_components() -> None:
     assert gains[MRA] == [f"{g:.1f}" for g in quick().gains[MRA]]
     (figure,) = anywhere.figures(quick())
     assert [len(c.x) for c in figure.panels[0].curves] == [100] * 5
+
+
+def test_the_synthesis_is_of_all_components_and_the_worst_point_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """C-08: without any component the error is not explained; without one it is explained but for that."""
+    monkeypatch.setattr(anywhere, "METHODS", (MRA, NET, DYNAMIC))
+    monkeypatch.setattr(anywhere, "POINTS", 20)
+    learned, measured = quick().learned, anywhere.as_measured
+    week = anywhere.predict(learned, 2)
+    monkeypatch.setattr(anywhere, "as_measured", lambda *given: 0.0 * measured(*given))
+    nothing = anywhere.judge(learned, week, 2)
+    assert nothing.closure == pytest.approx(np.abs(nothing.errors[WITHOUT]).max())
+    worst = {}
+    for code in ("X0C", "C0Y"):
+        mask = np.array([float(c.code != code) for c in COMPONENTS])
+        monkeypatch.setattr(anywhere, "as_measured", lambda *given, mask=mask: mask * measured(*given))
+        worst[code] = anywhere.judge(learned, week, 2).closure
+    assert min(worst.values()) > anywhere.CLOSED

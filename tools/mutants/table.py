@@ -52,11 +52,13 @@ class Project:
         if key not in self.table:
             return ["has no mutants"]
         entry, now = self.table[key], self.state(key)
+        killers = {m["by"].partition("[")[0] for m in entry["mutants"] if m["verdict"] == "killed"}
+        needed = {"code": {*now["code"]}, "tests": killers}  # a kill stands, whatever other tests are named
         found = [
             f"{what} changed: {piece}"
-            for what in now
-            for piece in now[what]
-            if now[what][piece] != entry[what].get(piece)
+            for what, pieces in needed.items()
+            for piece in sorted(pieces)
+            if piece not in now[what] or now[what][piece] != entry[what].get(piece)
         ]
         survived = [m for m in entry["mutants"] if m["verdict"] == "survived"]
         found += [f"no test kills {m['before']!r} -> {m['after']!r} in {m['piece']}" for m in survived]

@@ -124,7 +124,7 @@ function boxes(id, names, chosen, kind = "checkbox") {
   }));
 }
 
-const usualInputs = () => Object.assign({}, ...Object.values(seen).map(s => s.inputs || {}));
+const usualInputs = () => Object.assign({}, ...(state.settings.recordings || []).map(r => (seen[r.file] || {}).inputs || {}));
 
 function judgeForm() {  // only what is not yet shown: a choice of the user stays
   const compare = state.settings.compare || {}, names = [...new Set(Object.values(seen).flatMap(s => s.targets || []))];
