@@ -51,36 +51,42 @@ def test_a_frozen_model_has_the_lags_of_its_estimator() -> None:
     )
 
 
-def where_criteria_differ() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return input, drift and clock of a short test for which FPE, AIC and BIC find three different orders."""
-    for seed in range(400):
-        rng = np.random.default_rng(seed)
-        n, z = rng.normal(size=(22, 1)), np.zeros(22)
-        for t in range(1, 22):
-            z[t] = 0.7 * z[t - 1] + n[t, 0] + 0.8 * rng.normal()
-        dt = np.r_[np.inf, np.full(21, 600.0)]
-        made = [ARX(time="routed", criterion=c, k_max=4, m_max=4).fit(n, z, dt=dt) for c in ("fpe", "aic", "bic")]
-        orders = [(m.k_, m.m_) for m in made]
-        if len({*orders}) == 3:
-            return n, z, dt
-    raise AssertionError("no such test")
-
-
 def test_orders_are_those_of_the_final_prediction_error() -> None:
-    """P-02, E-P2: of the linear model, and of the net, which has the same search."""
-    n, z, dt = where_criteria_differ()
-    model = ARX(time="routed", k_max=4, m_max=4).fit(n, z, dt=dt)
+    """P-02, E-P2: of the linear model, and of the net, which has the same search; FPE, AIC and BIC differ here."""
+    rng = np.random.default_rng(91)
+    n, z = rng.normal(size=(22, 1)), np.zeros(22)
+    for t in range(1, 22):
+        z[t] = 0.7 * z[t - 1] + n[t, 0] + 0.8 * rng.normal()
+    dt = np.r_[np.inf, np.full(21, 600.0)]
+    model, aic, bic = (
+        ARX(time="routed", criterion=c, k_max=4, m_max=4).fit(n, z, dt=dt) for c in ("fpe", "aic", "bic")
+    )
 
     def fpe(o: Any) -> float:
         return float(o.sse / o.n_rows * (o.n_rows + o.n_parameters) / (o.n_rows - o.n_parameters))
 
     best = min((o for o in model.orders_ if o.admissible), key=fpe)
-    assert (model.k_, model.m_) == (best.k, best.m)
-    whole = ARX(time="routed").fit(n, z, dt=dt)
+    assert (model.k_, model.m_) == (best.k, best.m) == (2, 0)
+    assert [(m.k_, m.m_) for m in (aic, bic)] == [(4, 4), (1, 0)]
     net = NetARX(k=None, m=None, hidden=1, epochs=1, time="routed").fit(n, z, dt=dt)
-    assert (net.k_, net.m_) == (whole.k_, whole.m_)
-    bic = ARX(time="routed", criterion="bic").fit(n, z, dt=dt)
-    assert (bic.k_, bic.m_) != (whole.k_, whole.m_)
+    assert (net.k_, net.m_) == (2, 0)
+
+
+def test_the_net_of_the_study_has_the_orders_of_the_paper(monkeypatch: pytest.MonkeyPatch) -> None:
+    """P-02: k = 1, m = 0, at intervals of 10 min, from the speed."""
+    asked: list[dict[str, Any]] = []
+
+    def make(**given: Any) -> NetARX:
+        asked.append(given)
+        return NetARX(**given | {"hidden": 1, "epochs": 1})
+
+    monkeypatch.setattr(setup, "NetARX", make)
+    monkeypatch.setattr(setup, "INTERVALS", (600.0,))
+    monkeypatch.setattr(setup, "CUTS", 1)
+    setup.compute(0, tell_nobody)
+    assert len(asked) == 4
+    for given in asked:
+        assert (given["k"], given["m"], given["interval"], given["inputs"]) == (1, 0, 600.0, ("spindle_rpm",))
 
 
 def test_the_study_searches_by_the_final_prediction_error() -> None:
