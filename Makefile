@@ -27,7 +27,7 @@ demo: $(VENV)/.study
 test: $(VENV)/.dev
 	scripts/system_packages.sh chromium clang gcc gcc-arm-none-eabi libc6-dev libclang-rt-dev libnewlib-arm-none-eabi linuxcnc-uspace \
 		linuxcnc-uspace-dev mosquitto qemu-system-arm
-	$(ONE_THREAD) $(BIN)/python $(COVERAGE) -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST)
+	$(ONE_THREAD) $(BIN)/python $(UNDER) -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(PYTEST)
 
 test-long: $(VENV)/.dev
 	scripts/system_packages.sh gcc libc6-dev linuxcnc-uspace mosquitto

@@ -74,6 +74,7 @@ def test_a_smaller_set_is_taken_for_the_next_run(finished_project: Path, tmp_pat
         page.locator("#tab-judge").press("Enter")
         assert page.locator("#inputs input:checked").count() == page.locator("#inputs input").count() == 4
         page.locator("#details .charts .card").first.locator("circle").nth(one).press("Enter")
+        assert "too small an error" in page.locator("#details .charts [role=status]").first.inner_text()
         page.get_by_role("button", name="Choose these inputs for the next run").press("Enter")
         assert page.evaluate("document.activeElement.id") == "start"
         page.keyboard.press("Enter")

@@ -60,8 +60,6 @@ WRITING = {
 _WRITES = {"write_text", "write_bytes", "touch", "symlink_to", "hardlink_to", "open_to_write", "replace_lines"}
 _WRITES |= {"to_csv", "to_parquet", "to_excel", "to_json", "to_pickle", "tofile", "savetxt", "savez", "write_table"}
 _WRITES |= {"copyfile", "copy2", "copytree", "mkstemp", "NamedTemporaryFile", "imsave"}
-
-
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 

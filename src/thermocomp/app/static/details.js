@@ -58,7 +58,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
       const choose = () => {
         for (const other of svg.querySelectorAll("circle")) other.setAttribute("aria-pressed", other === dot);
         said.textContent = `${p.model} (${size(p)}): ${um(p.error)} ${unit}. ${p.sensors.join(", ") || _("no sensor")}`;
-        if (sets && p.sensors.length) said.append(" ", button(_("Choose these inputs for the next run"), () => use(p.sensors)));
+        if (sets && p.sensors.length) said.append(" ", button(_("Choose these inputs for the next run"), () => use(p.sensors)), " ", _("They are chosen on these data: the next run will state too small an error; a new recording shows the true one."));
       };
       dot.addEventListener("click", choose);
       dot.addEventListener("keydown", e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); choose(); } });
