@@ -7,6 +7,8 @@ alone, and the training code is never loaded by the server.
 import json
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from tomlkit.exceptions import TOMLKitError
@@ -21,6 +23,7 @@ from thermocomp.recordings.readers.mapping import Mapping as ColumnMapping
 from thermocomp.recordings.readers.mending import Draft, located, mend, take_best, to_toml
 from thermocomp.recordings.readers.opening import open_table
 from thermocomp.recordings.readers.tables import FileTable
+from thermocomp.recordings.readers.workbook import list_sheets
 from thermocomp.recordings.recording import Recording
 from thermocomp.report import checks
 from thermocomp.report.language import translate, use_language
@@ -58,16 +61,18 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
             raise InputError(f"{str(answer)[:200]} is no entry of a mapping: {e}") from e
     text = draft.text
     try:
-        mended = mend(file, text, take_best if guess else lambda _: None)
+        mended = mend(file, text, take_best if guess else lambda _: None, translate)
     except InputError as e:
         message = str(e).removeprefix(f"{file}: ")
-        return {"mapping": text, "error": message, "options": [_option(r, to_toml(r)) for r in e.remedies]}
+        options = [_option(r, to_toml(r)) for r in e.remedies]
+        return {"mapping": text, "error": message, "options": options, **_raw(file, draft)}
     recording, whole = mended.recording, Draft(mended.text).mapping(file)
     findings = check(recording)
     table = open_table(file, whole)[0]
     ways = [located(f, recording, whole, table.headings) if f.remedy else {} for f in findings]
     return {
         "mapping": mended.text,
+        **_sheets(file, whole),
         "summary": translate(_summary(recording)),
         "columns": _columns(table, whole),
         "questions": [
@@ -125,13 +130,41 @@ def _option(remedy: Mapping[str, Any], text: str) -> dict[str, Any]:
     return {"remedy": remedy, "toml": text}
 
 
+def _sheets(file: str, mapping: ColumnMapping) -> dict[str, Any]:
+    """Return the sheets of a workbook, and the one that the mapping names."""
+    path = Path(file)
+    names = list_sheets(path, mapping.limits) if path.suffix.lower() in (".xlsx", ".ods") else []
+    return {"sheets": names[:COLUMNS], "sheet": mapping.read.sheet} if len(names) > 1 else {}
+
+
+def _raw(file: str, draft: Draft) -> dict[str, Any]:
+    """Return what is known of a file that cannot be read: its sheets, its first rows."""
+    found: dict[str, Any] = {}
+    with suppress(Exception):  # it is damaged in one way or another, and the reason is known
+        found |= _sheets(file, mapping := draft.mapping(file))
+        table = open_table(file, mapping)[0]
+        found |= {
+            "columns": [
+                {"heading": h, "number": k + 1, "cells": _cells(table, k), "kind": "ignored", "scale": 1.0}
+                for k, h in enumerate(table.headings[:COLUMNS])
+            ]
+        }
+    return found
+
+
+def _cells(table: FileTable, column: int) -> list[str]:
+    if cells := table.head(column)[:ROWS]:
+        return cells
+    if not table.is_number(column, empty=False):
+        return []
+    return [f"{v:g}" for v in table.load([column], [])[0][column].head(ROWS)]
+
+
 def _columns(table: FileTable, mapping: ColumnMapping) -> list[dict[str, Any]]:
     """Return the first columns of a file: heading, first cells, and how they are understood."""
     planned = plan(table, mapping)
     channels = {c.index: c for c in planned.columns}
     times = {planned.times.time, planned.times.date, *planned.beside}
-    numbers = [k for k, _ in enumerate(table.headings[:COLUMNS]) if table.is_number(k, empty=False)]
-    values, _ = table.load([k for k in numbers if k in channels], [])
     found = []
     for k, heading in enumerate(table.headings[:COLUMNS]):
         c = channels.get(k)
@@ -141,12 +174,11 @@ def _columns(table: FileTable, mapping: ColumnMapping) -> list[dict[str, Any]]:
             kind = "cycle"
         else:
             kind = "ignored" if c is None else c.channel.quantity
-        cells = table.head(k)[:ROWS] or ([f"{v:g}" for v in values[k].head(ROWS)] if k in values else [])
         found.append(
             {
                 "heading": heading,
                 "number": k + 1,
-                "cells": cells,
+                "cells": _cells(table, k),
                 "kind": kind,
                 "channel": "" if c is None else c.channel.name,
                 "unit": planned.time_unit if kind == "time" else "" if c is None else c.unit.symbol,

@@ -190,6 +190,8 @@ def _plan_mapped(
         heading = headings[index]
         used.add(index)
         if rule.role == "ignore":
+            said = rule.reason if name in rule.reason else f"{name}: {rule.reason}"
+            notes.extend([f"left out: {said}"] if rule.reason else [])
             continue
         other = tables.setdefault(index, name)
         if other != name:

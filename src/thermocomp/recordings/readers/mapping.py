@@ -94,6 +94,8 @@ class ColumnMap:
         Location of the sensor as text.
     valid : tuple of float, optional
         Minimum and maximum valid value, in `unit` after `scale` and `zero`; values outside are missing.
+    reason : str
+        Why the column is ignored, as a note on the recording.
     """
 
     column: Place = ""
@@ -104,6 +106,7 @@ class ColumnMap:
     missing: tuple[float | str, ...] = ()
     place: str = ""
     valid: tuple[float, float] | None = None
+    reason: str = ""
 
     @property
     def conversion(self) -> Unit | None:

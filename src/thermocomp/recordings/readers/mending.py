@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.items import Table
 
 from thermocomp.core.exceptions import InputError, RecordingError, Remedy, TwoReadingsError, UnitError
+from thermocomp.core.messages import Message
 from thermocomp.files.draft import write_text
 from thermocomp.files.plaintext import read_text
 from thermocomp.files.tomlfile import MOST
@@ -166,10 +167,22 @@ def read_draft(mapping: str | Path | None) -> str:
     return read_text(Path(mapping), "mapping file", MOST)
 
 
-def mend(path: str | Path, text: str, decide: Decide) -> Mended:
-    """Create a mapping with which a file can be read, and which repairs its data-quality problems."""
+def mend(path: str | Path, text: str, decide: Decide, say: Callable[[str], str] = str) -> Mended:
+    """Create a mapping with which a file can be read, and which repairs its data-quality problems.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path of the file.
+    text : str
+        TOML of the mapping to start from.
+    decide : callable
+        Chooses an option of each question.
+    say : callable
+        Returns a finding in the language of the user: the reason in the mapping why a column is ignored.
+    """
     owner = str(path)
-    dialogue = _Dialogue(Draft(text), decide, path)
+    dialogue = _Dialogue(Draft(text), decide, path, say)
     table = dialogue.until(lambda: open_table(path, dialogue.draft.mapping(owner)))[0]
     mapping = dialogue.draft.mapping(owner)
     if not mapping.read.only_mapped:
@@ -242,12 +255,15 @@ class _Dialogue:
     ----------
     path : str or Path
         Path of the file.
+    say : callable
+        See `mend`.
     """
 
-    def __init__(self, draft: Draft, decide: Decide, path: str | Path) -> None:
+    def __init__(self, draft: Draft, decide: Decide, path: str | Path, say: Callable[[str], str] = str) -> None:
         self.draft = draft
         self.decide = decide
         self.path = path
+        self.say = say
         self.first: RecordingError | UnitError | None = None  #: first error for which a row would be skipped
         self.decided: list[tuple[Question, Remedy | None]] = []
 
@@ -257,7 +273,7 @@ class _Dialogue:
             return False
         answer = self.decide(question)
         self.decided.append((question, answer))
-        return answer is not None and self.draft.add(answer)
+        return answer is not None and self.draft.add(_explained(answer, self.say(question.text)))
 
     def ask_finding(self, finding: Finding, way: Remedy, unit: str) -> None:
         """Have a finding decided; a unit of time that is stated in the file is replaced or confirmed by the user only.
@@ -267,7 +283,10 @@ class _Dialogue:
         unit : str
             Unit that the file states for its times.
         """
-        text, timed = f"{finding.channel} {finding.text}".strip(), "unit" in way.get("time", {})
+        timed = "unit" in way.get("time", {})
+        text = (
+            Message("{channel} {text}", channel=finding.channel, text=finding.text) if finding.channel else finding.text
+        )
         options = (way, confirm(unit)) if timed and way != confirm(unit) else (way,)
         self.ask(Question(text, options, finding.severity, may_guess=not timed))
         if timed and finding.severity == "trouble" and not self.draft.document.get("time", {}).get("unit"):
@@ -302,6 +321,15 @@ class _Dialogue:
                 if not self.ask(Question(str(e), e.remedies, "error", may_guess)):
                     raise
         return action()
+
+
+def _explained(remedy: Remedy, reason: str) -> Remedy:
+    """Return an entry of a mapping in which a column that is ignored has a reason."""
+    columns = {
+        name: {**said, "reason": reason} if said.get("role") == "ignore" else said
+        for name, said in remedy.get("columns", {}).items()
+    }
+    return {**remedy, "columns": columns} if columns else remedy
 
 
 def _skips(remedy: Remedy) -> bool:

@@ -20,9 +20,12 @@ from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingE
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
     FileLayout,
+    find_columns,
     find_end,
     find_layout,
     find_rest,
+    find_timed,
+    is_row,
     join_units,
     tell_end,
     tell_layout,
@@ -56,7 +59,7 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
         check_unzipped(path, limits)
         with ExitStack() as stack:
             stack.enter_context(warnings.catch_warnings(action="ignore"))  # about styles and similar
-            sheets = _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack, limits)
+            sheets = _sheets(path, stack, limits)
             limits.check("sheets", len(sheets), path)
             name, notes = _choose(path, sheets, options)
             return _table(path, name, stack.enter_context(closing(sheets[name]())), notes, options, limits)
@@ -68,6 +71,18 @@ def open_workbook(path: Path, options: ReadOptions, limits: FileLimits) -> Frame
         raise RecordingError(
             f"{path}: this is not a workbook, or a damaged one ({type(e).__name__}: {e}); save it again"
         ) from e
+
+
+def list_sheets(path: Path, limits: FileLimits) -> list[str]:
+    """Return the names of the sheets of a workbook."""
+    check_unzipped(path, limits)
+    with ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings(action="ignore"))
+        return [*_sheets(path, stack, limits)]
+
+
+def _sheets(path: Path, stack: ExitStack, limits: FileLimits) -> Sheets:
+    return _ods_sheets(path, limits) if path.suffix.lower() == ".ods" else _xlsx_sheets(path, stack, limits)
 
 
 def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tuple[str, ...]]:
@@ -84,10 +99,11 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
         )
     if len(sheets) == 1:
         return first, ()
-    likely = []
+    sizes = {}
     for name, open_rows in sheets.items():
         with closing(open_rows()) as rows:
-            likely += [name] if find_layout(_sample(rows)) is not None else []
+            sizes[name] = _count_rows(_sample(rows))
+    likely = [name for name, size in sizes.items() if size and 2 * size >= max(sizes.values())]
     if len(likely) > 1:
         raise RecordingError(
             f"{path}: the sheets {', '.join(map(repr, likely))} all hold a table; state which in a mapping, such as "
@@ -98,7 +114,18 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     return name, (f"sheet {name!r} of {names} is read",)
 
 
+def _count_rows(rows: Sequence[Sequence[str]]) -> int:
+    """Count the rows of a table of two or more columns of values; names with one value each are a cover sheet."""
+    layout = find_layout(rows)
+    if layout is None:
+        return 0
+    body = rows[layout.begin :]
+    columns, timed = find_columns(body)[1], find_timed(body)
+    return sum(is_row(row, columns, timed) for row in body) if len(columns) > 1 else 0
+
+
 def _sample(rows: Iterable[Row]) -> list[list[str]]:
+    """Return the first rows as text, all of them as wide as the widest, as in a text file."""
     found: list[list[str]] = []
     cells = 0
     for place, row in enumerate(rows):
@@ -107,7 +134,8 @@ def _sample(rows: Iterable[Row]) -> list[list[str]]:
             cells += len(row)
         if len(found) == _SAMPLE or (cells > _SAMPLE_CELLS and len(found) >= 4) or place > _SAMPLE_PLACES:
             break
-    return found
+    width = max(map(len, found), default=0)
+    return [row + [""] * (width - len(row)) for row in found]
 
 
 def _table(
