@@ -20,6 +20,14 @@ from thermocomp.cli.app import run as command
 from thermocomp.core.alone import alone
 from thermocomp.core.exceptions import InputError
 
+AFTER = """
+[export]
+to = "nowhere"
+
+[[assess]]
+file = "files/drift.csv"
+"""
+
 
 def steps(folder: RunFolder) -> list[str]:
     return [step["name"] for step in folder.read()["steps"]]
@@ -116,15 +124,46 @@ def test_what_fails_says_why_and_stays(tmp_path: Path) -> None:
 
 
 def test_a_failed_export_keeps_the_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = small_project(tmp_path / "project", QUICK + '\n[export]\nto = "nowhere"\n')
-    with pytest.raises(InputError, match="nowhere"):
-        rerun(folder)
-    (run,) = runs_of(folder)
-    assert (run.read()["state"], steps(run)) == ("failed", ["check", "compare", "fit"])
+    folder = small_project(
+        tmp_path / "project", QUICK + '\n[export]\nto = "nowhere"\n\n[[assess]]\nfile = "files/drift.csv"\n'
+    )
+    run = rerun(folder)
+    assert (run.read()["state"], steps(run)) == ("done", ["check", "compare", "fit", "export", "assess"])
+    (failed,) = run.errors()
+    assert failed.startswith("export: --to 'nowhere': no such target")
+    assert rerun(folder).errors() == [failed]
+    assert [p.name for p in run.path.glob("assessment*.html")] == ["assessment.html"], "it was assessed again"
     change(folder, "nowhere", "c99")
     monkeypatch.setattr(running, "compare", lambda *_, **__: pytest.fail("it was compared again"))
     assert rerun(folder).number == 1
-    assert (run.read()["state"], run.read()["error"], steps(run)[-1]) == ("done", "", "export")
+    assert (run.read()["state"], run.errors(), sorted(steps(run))) == (
+        "done",
+        [],
+        ["assess", "check", "compare", "export", "fit"],
+    )
+
+
+def test_the_models_of_an_earlier_run_are_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = small_project(tmp_path / "project")
+    first = rerun(folder)
+    before = (first.path / "model.json").read_bytes()
+    change(folder, 'models = ["ols"]', 'models = ["partial-f"]')
+    second = rerun(folder)
+    assert second.number == 2
+    change(folder, "[compare]", '[export]\nto = "c99"\n\n[compare]')
+    with monkeypatch.context() as patched:
+        patched.setattr(running, "compare", lambda *_, **__: pytest.fail("it was compared again"))
+        run = run_project(Project(folder), silent, number=1).folder
+    assert (run.number, steps(run)[-1], (first.path / "model.json").read_bytes()) == (1, "export", before)
+    assert "partial-f" not in (first.path / "project.toml").read_text(encoding="utf-8")
+    assert "export" not in steps(second)
+    assert rerun(folder).number == 2, "the project itself goes on with its last run"
+    with pytest.raises(InputError, match="there is no run 7"):
+        run_project(Project(folder), silent, number=7)
+    drift = folder / "files" / "drift.csv"
+    drift.write_bytes(drift.read_bytes() + b"\n")
+    with pytest.raises(InputError, match="since this run a recording, a mapping or the version"):
+        run_project(Project(folder), silent, number=1)
 
 
 def test_a_file_that_changes_meanwhile_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

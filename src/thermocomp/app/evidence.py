@@ -1,7 +1,8 @@
 """What a run keeps for its page beside the results of the commands: curves, sensor sets, and a live configuration."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
@@ -11,7 +12,11 @@ from thermocomp.api.results import Compared
 from thermocomp.api.select import Selected
 from thermocomp.cli.jsonoutput import as_text
 from thermocomp.core.correction import Limits
+from thermocomp.core.exceptions import InputError
 from thermocomp.core.model import ErrorModel
+from thermocomp.core.plugins import find_plugins
+from thermocomp.export.reduction.reduced import find_axis
+from thermocomp.export.target import find_target
 from thermocomp.judging.budget import Budget
 from thermocomp.report import curves
 from thermocomp.report.language import translate
@@ -74,10 +79,16 @@ def _points(found: Budget) -> list[dict[str, Any]]:
     ]
 
 
-def reasons_of(found: Compared) -> str:
-    """Return the translation of the reasons of verdicts, by their English text, as JSON."""
+def words_of(found: Compared) -> str:
+    """Return what the page needs beside the results, as JSON.
+
+    The translation of the reasons of verdicts by their English text, the axes in the names of the targets, and the
+    controllers whose export needs axes.
+    """
     reasons = {a.reason for a in found.comparison.overall()}
-    return as_text({"words": {str(r): str(translate(r)) for r in sorted(reasons)}})
+    axes = {a.target: find_axis(a.target, {}) for a in found.comparison.overall()}
+    words = {str(r): str(translate(r)) for r in sorted(reasons)}
+    return as_text({"words": words, "axes": axes, "driven": [*_driven()]})
 
 
 def live_configuration(models: Sequence[ErrorModel], limits: Limits, interval: float) -> str:
@@ -92,3 +103,11 @@ def live_configuration(models: Sequence[ErrorModel], limits: Limits, interval: f
     table = f"{tomlkit.dumps({'limits': asdict(limits)})}\n"
     channels = ", ".join(json.dumps(name) for name in used)
     return _LIVE.format(interval=interval, limits=table, channels=channels, first=json.dumps(used[0]))
+
+
+def _driven() -> Iterator[str]:
+    """Yield the export targets that need the axes of the models."""
+    for name in find_plugins("exporters"):
+        with suppress(InputError):  # a plug-in that cannot be loaded
+            if (target := find_target(name)).axes or target.shape:
+                yield name

@@ -256,6 +256,17 @@ class Project:
                 raise InputError(f"{self.file}: {path.name}: the file cannot be read: {e.strerror}") from e
         return whole.hexdigest()
 
+    def as_learned(self, copy: Path) -> "Project":
+        """Return the project with those settings of a run that determine its models, from the copy in its folder."""
+        learned = read_toml(copy, "project file")
+        found = Project.__new__(Project)
+        found.file, found.folder = self.file, self.folder
+        found.content = {name: t for name, t in self.content.items() if name not in LEARNED} | {
+            name: t for name, t in learned.items() if name in LEARNED
+        }
+        found.settings = settings_of(found.content, copy)
+        return found
+
     def fingerprint(self) -> str:
         """Return the key of the comparison and the fitted models."""
         return self.key_of(LEARNED, self.settings.recordings)

@@ -36,6 +36,8 @@ class RunStep:
         The result in a sentence or two.
     key : str
         Key of the settings that only this step depends on.
+    error : str
+        Reason why it could not be done; the steps that do not depend on it were done.
     """
 
     name: str
@@ -43,6 +45,7 @@ class RunStep:
     files: list[str]
     text: str
     key: str = ""
+    error: str = ""
 
 
 @dataclass
@@ -102,12 +105,24 @@ class RunFolder:
         return {"number": self.number, **found}
 
     def take_up(self) -> None:
-        """Continue with the state of an earlier process: finished steps are kept."""
+        """Continue with the state of an earlier process: finished steps are kept.
+
+        Raises
+        ------
+        InputError
+            The run is going on in another process.
+        """
         found = self.read()
+        if found["state"] == "running":
+            raise InputError(f"{self.path}: this run is going on in another process; stop that one first")
         steps = [RunStep(**s) for s in found["steps"]]
         self.state = RunState(
             fingerprint=found["fingerprint"], version=found["version"], began=found["began"], steps=steps
         )
+
+    def errors(self) -> list[str]:
+        """Return why steps after the fit could not be done."""
+        return [f"{step['name']}: {step['error']}" for step in self.read()["steps"] if step.get("error")]
 
     def save(self) -> None:
         """Write the state."""

@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from thermocomp import __version__
 from thermocomp.api.check import check
 from thermocomp.api.inputs import read
@@ -14,13 +16,13 @@ from thermocomp.api.plan import plan
 from thermocomp.api.results import Compared, FittedModels
 from thermocomp.api.select import select
 from thermocomp.api.verbs import assess, compare
-from thermocomp.app.evidence import curves_of, live_configuration, points_of, reasons_of
+from thermocomp.app.evidence import curves_of, live_configuration, points_of, words_of
 from thermocomp.app.project import COMMON, Project, ProjectRecording, given
 from thermocomp.app.runfolder import RunFolder, RunStep, new_run, runs_of
 from thermocomp.app.store import NAME
 from thermocomp.cli.answers import free
 from thermocomp.cli.jsonoutput import as_text
-from thermocomp.core.exceptions import InputError
+from thermocomp.core.exceptions import InputError, ThermocompError
 from thermocomp.export.target import find_target
 from thermocomp.export.verbs import export
 from thermocomp.files.draft import write_text
@@ -65,7 +67,7 @@ class RunProgress:
             self._next = time.monotonic() + OFTEN
 
 
-def run_project(project: Project, tell: Callable[..., object], *, again: bool = False) -> "ProjectRun":
+def run_project(project: Project, tell: Callable[..., object], *, again: bool = False, number: int = 0) -> "ProjectRun":
     """Run a project: continue its last run if nothing has changed since, else in a new folder.
 
     Parameters
@@ -75,6 +77,8 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
         Receives the progress; see `RunProgress`.
     again : bool
         Start a new run in any case.
+    number : int
+        Number of a run whose models are exported and assessed; 0: the last one.
 
     Returns
     -------
@@ -84,8 +88,11 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
     Raises
     ------
     InputError
-        A step cannot be done; the reason is also in the folder of the run.
+        The models cannot be learned; the reason is also in the folder of the run. That a later step cannot be done is
+        only in the folder, see `RunFolder.errors`.
     """
+    if number:
+        return _go_on(project, tell, number)
     fingerprint = project.fingerprint()
     last = next(reversed(runs_of(project.folder)), None)
     found = {} if last is None else last.read()
@@ -95,10 +102,28 @@ def run_project(project: Project, tell: Callable[..., object], *, again: bool = 
         folder.state.fingerprint, folder.state.version = fingerprint, __version__
     else:
         folder = last
-        if found["state"] == "running":
-            raise InputError(f"{folder.path}: this run is going on in another process; stop that one first")
         folder.take_up()
-    write_text(project.file.read_text(encoding="utf-8"), folder.path / NAME, overwrite=True)
+    return _work(project, folder, tell, project.file.read_text(encoding="utf-8"))
+
+
+def _go_on(project: Project, tell: Callable[..., object], number: int) -> "ProjectRun":
+    """Do the steps after the fit of a run of other settings."""
+    folder = next((r for r in runs_of(project.folder) if r.number == number), None)
+    if folder is None:
+        raise InputError(f"{project.folder}: there is no run {number}")
+    learned = project.as_learned(folder.path / NAME)
+    folder.take_up()
+    if not any(step.name == "fit" for step in folder.state.steps):
+        raise InputError(f"{folder.path}: this run has no models: choose one that has, or run the project")
+    if folder.state.fingerprint != learned.fingerprint():
+        raise InputError(
+            f"{folder.path}: since this run a recording, a mapping or the version of thermocomp has changed: run again"
+        )
+    return _work(learned, folder, tell, tomlkit.dumps(learned.content))
+
+
+def _work(project: Project, folder: RunFolder, tell: Callable[..., object], settings: str) -> "ProjectRun":
+    write_text(settings, folder.path / NAME, overwrite=True)
     run = ProjectRun(project, folder, tell)
     run.work()
     return run
@@ -127,7 +152,7 @@ class ProjectRun:
         Raises
         ------
         InputError
-            A step cannot be done.
+            The models cannot be learned.
         KeyboardInterrupt
             The run was stopped.
         """
@@ -138,14 +163,15 @@ class ProjectRun:
         ):
             if not self._has("fit"):
                 self._learn()
+            self.folder.state.steps = [s for s in self.folder.state.steps if not s.error]
             if self.settings.export is not None:
-                self._step("export", self._export, self.project.key_of(("export", "limits"), ()))
+                self._follow("export", self._export, self.project.key_of(("export", "limits"), ()))
             if self.settings.assess:
-                self._step("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
+                self._follow("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
             if self.settings.select is not None:
-                self._renew("select", self._select, self.project.key_of(("select",), ()))
+                self._follow("select", self._select, self.project.key_of(("select",), ()), only=True)
             if self.settings.plan is not None:
-                self._renew("plan", self._plan, self.project.key_of(("plan",), ()))
+                self._follow("plan", self._plan, self.project.key_of(("plan",), ()), only=True)
 
     def _learn(self) -> None:
         tests = self._recordings()
@@ -182,7 +208,7 @@ class ProjectRun:
             found,
             (found.report, "comparison.html"),
             (partial(write_text, curves_of(found)), "curves.json"),
-            (partial(write_text, reasons_of(found)), "words.json"),
+            (partial(write_text, words_of(found)), "words.json"),
         )
         if found.comparison.left:
             raise KeyboardInterrupt
@@ -258,11 +284,24 @@ class ProjectRun:
     def _has(self, name: str, key: str = "") -> bool:
         return any((s.name, s.key) == (name, key) for s in self.folder.state.steps)
 
-    def _renew(self, name: str, work: Callable[[], tuple[list[str], str]], key: str) -> None:
-        """Execute a step unless its last result is of the same settings; the run lists only this one."""
-        if not self._has(name, key):
+    def _follow(self, name: str, work: Callable[[], tuple[list[str], str]], key: str, *, only: bool = False) -> None:
+        """Execute a step after the fit; one that cannot be done leaves the models and the other steps as they are.
+
+        Parameters
+        ----------
+        only : bool
+            The run lists only its last result.
+        """
+        if only and not self._has(name, key):
             self._forget(name)
+        try:
             self._step(name, work, key)
+        except ThermocompError as e:
+            state = self.folder.state
+            seconds = round(time.time() - state.step_began, 1)
+            state.steps.append(RunStep(name=name, seconds=seconds, files=[], text="", key=key, error=str(e)))
+            state.step = state.task = ""
+            self.folder.save()
 
     def _forget(self, name: str) -> None:
         self.folder.state.steps = [s for s in self.folder.state.steps if s.name != name]

@@ -58,7 +58,7 @@ class Store:
         self.editing, self.workers = asyncio.Lock(), Workers()
         self.preferred = ""
         self._run: subprocess.Popen[bytes] | None = None
-        self._said, self._before = 0, ""
+        self._said, self._before = 0, ("", 0)
         self._read: dict[str, tuple[tuple[Any, ...], dict[str, Any]]] = {}
         self.document()
 
@@ -245,8 +245,13 @@ class Store:
 
     # -- runs ----------------------------------------------------------------------------------------------------------
 
-    async def start_run(self, *, again: bool) -> None:
+    async def start_run(self, *, again: bool, number: int = 0) -> None:
         """Start a run of the project as a process that does not end with this one.
+
+        Parameters
+        ----------
+        again, number
+            See `thermocomp.app.running.run_project`.
 
         Raises
         ------
@@ -254,28 +259,29 @@ class Store:
             The last one that was started here has not ended.
         """
         ended = self._last_end()
-        if self._run is not None and ended and ended != self._before:  # its result is there: it is about to end
+        if self._run is not None and ended != self._before:  # its result is there: it is about to end
             with suppress(subprocess.TimeoutExpired):
                 await asyncio.to_thread(self._run.wait, ENDING)
         if self._run is not None and self._run.poll() is None:
             raise InputError("a run is going on: stop it first, or wait for its end")
         self._before = ended
-        words = [sys.executable, "-X", "utf8", "-m", "thermocomp", "run", ".", *(["--again"] if again else [])]
+        words = [sys.executable, "-X", "utf8", "-m", "thermocomp", "run", "."]
+        words += [*(["--again"] if again else []), *(["--number", str(number)] if number else [])]
         more: dict[str, Any] = {"start_new_session": True} if os.name == "posix" else {"creationflags": _OWN_CONSOLE}
         nothing = subprocess.DEVNULL
         with (self.folder / "run.log").open("ab") as log:
             self._said = log.tell()
             self._run = subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=self.folder, **more)
 
-    def _last_end(self) -> str:
-        """Return number and time of the last run if it has ended."""
-        found = [run.read() for run in runs_of(self.folder)[-1:]]
-        return next((f"{run['number']} {run['ended']}" for run in found if run["ended"]), "")
+    def _last_end(self) -> tuple[str, int]:
+        """Return number and time of the run that ended last."""
+        found = [run.read() for run in runs_of(self.folder)]
+        return max(((run["ended"], run["number"]) for run in found), default=("", 0))
 
     def trouble(self) -> str:
         """Return what the last run that was started here said if it refused its input, maybe before it had a folder."""
-        if self._run is None or self._run.poll() != 2:
-            return ""
+        if self._run is None or self._run.poll() != 2 or self._last_end() != self._before:
+            return ""  # what a run has said is in its folder
         with suppress(OSError), (self.folder / "run.log").open("rb") as log:
             log.seek(self._said)
             return " ".join(log.read(10_000).decode(errors="replace").split())

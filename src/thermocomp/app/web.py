@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 import jinja2
 import tomlkit
 from babel.core import negotiate_locale
-from fastapi import APIRouter, Body, FastAPI, Request
+from fastapi import APIRouter, Body, FastAPI, Query, Request
 from fastapi import Path as InPath
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, HTMLResponse, StreamingResponse
@@ -156,11 +156,11 @@ def _results(store: Store) -> APIRouter:
     router = APIRouter()
 
     @router.post("/api/runs")
-    async def start(again: bool = False) -> Json:
+    async def start(again: bool = False, number: Annotated[int, Query(ge=0, le=10**9)] = 0) -> Json:
         if not store.content().get("recordings"):
             raise InputError("the project has no recording: drop a file on the page first")
         async with store.editing:
-            await store.start_run(again=again)
+            await store.start_run(again=again, number=number)
         return Json({"started": True})
 
     @router.delete("/api/runs/{number}")
@@ -174,7 +174,8 @@ def _results(store: Store) -> APIRouter:
         names = ("check", "compare", "fit", "assess", "sensors", "plan")
         found = {n: read_json(folder.path / f"{n}.json") for n in names}
         words = read_json(folder.path / "words.json")
-        return Json({**folder.read(), "results": found, "words": words.get("words") if isinstance(words, dict) else {}})
+        told = {k: words.get(k) for k in ("words", "axes", "driven")} if isinstance(words, dict) else {}
+        return Json({**folder.read(), "results": found, **told})
 
     @router.get("/runs/{number}/{name:path}")
     async def file(number: Annotated[int, InPath(ge=1, le=10**9)], name: str) -> FileResponse:

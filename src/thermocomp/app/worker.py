@@ -55,6 +55,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
     draft = Draft(mapping)
     for answer in answers:
         try:
+            draft = Draft() if "sheet" in answer.get("read", {}) else draft  # of another sheet all is different
             draft.add(answer)
             draft.text.encode()  # half a character
         except (AttributeError, TypeError, ValueError, TOMLKitError) as e:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from thermocomp.app.runfolder import RunFolder
 
 
-def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
+def run(project: Path, /, *, again: bool = False, number: int = 0, json: bool = False) -> int:
     """Run a project: check its recordings, compare methods, fit the recommended ones, export and assess them.
 
     The results are in a new folder, ``runs/NUMBER``. A run that was stopped or killed is continued with the step that
@@ -28,6 +28,9 @@ def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
         Project file (project.toml), or its folder.
     again : bool
         Start a new run, even if nothing has changed since the last one.
+    number : int
+        Number of an earlier run: export and assess its models, although the settings have changed since. 0: the last
+        run.
     json : bool
         Print results as JSON instead of tables.
 
@@ -38,13 +41,14 @@ def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
     """
     from thermocomp.app.project import Project
     from thermocomp.app.running import run_project
+    from thermocomp.core.exceptions import InputError
     from thermocomp.core.explained import explain_all
     from thermocomp.files import modelfile
 
     opened = Project(project)
     try:
         with show_progress(hidden=json, warn=print_trouble) as progress:
-            folder = run_project(opened, progress, again=again).folder
+            folder = run_project(opened, progress, again=again, number=number).folder
     except KeyboardInterrupt:
         console.print(words(f"stopped; to continue: thermocomp run {project}"), soft_wrap=True)
         return STOPPED
@@ -53,16 +57,19 @@ def run(project: Path, /, *, again: bool = False, json: bool = False) -> int:
     models = explain_all(modelfile.read(folder.path / "model.json")).models
     if not json:
         print_answer(answer_models(models, _following(project, folder), [folder.path]), console, hint=False)
+    if errors := folder.errors():
+        raise InputError("; ".join(errors))
     return 0 if any(e.word.startswith("accepted") for e in models) else 1
 
 
 def _told(step: Mapping[str, Any]) -> dict[str, Any]:
-    return {"step": step["name"], "seconds": step["seconds"], "files": step["files"], "result": step["text"]}
+    told = {"step": step["name"], "seconds": step["seconds"], "files": step["files"], "result": step["text"]}
+    return told | ({"error": step["error"]} if step["error"] else {})
 
 
 def _following(project: Path, folder: "RunFolder") -> tuple[str, ...]:
     """Return the command that follows: export, unless the project does it."""
-    exported = any(step["name"] == "export" for step in folder.read()["steps"])
+    exported = any(step["name"] == "export" and not step["error"] for step in folder.read()["steps"])
     model = str(folder.path / "model.json")
     return (
         ("thermocomp", "app", str(project))

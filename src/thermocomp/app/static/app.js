@@ -1,12 +1,12 @@
 "use strict";
 // The page of a project: it shows what the server tells, and asks it for everything that is done. make, css, show: curves.js
 const $ = id => document.getElementById(id);
-const KINDS = { temperature: _("temperature"), displacement: _("deviation or displacement"), spindle_speed: _("spindle speed"), position: _("axis position"), angle: _("angle"), feed: _("feed"), cycle: _("label of cycles"), ignore: _("ignore") };
-const UNITS = { temperature: ["degC", "degF", "K"], displacement: ["um", "mm", "in", "nm"], spindle_speed: ["1/min", "Hz"], position: ["mm", "um", "in"], angle: ["urad", "deg"], feed: ["mm/min"] };
+const KINDS = { time: _("time"), temperature: _("temperature"), displacement: _("deviation or displacement"), spindle_speed: _("spindle speed"), position: _("axis position"), angle: _("angle"), feed: _("feed"), cycle: _("label of cycles"), ignore: _("ignore") };
+const UNITS = { time: ["", "s", "ms", "min", "h"], temperature: ["degC", "degF", "K"], displacement: ["um", "mm", "in", "nm"], spindle_speed: ["1/min", "Hz"], position: ["mm", "um", "in"], angle: ["urad", "deg"], feed: ["mm/min"] };
 const METHODS = ["ols", "partial-f", "mra", "dynamic", "averaged", "grouping", "subsets", "ace", "ace-monotone", "mlp", "ridge", "pcr", "pls", "lasso", "ppr"], USUAL = 5;
 const UNIT = { cycle: _("thermal cycles"), day: _("days"), file: _("files") };
 const TARGETS = { c99: _("C99 (DSP, PLC, computer)"), st: _("structured text, CODESYS"), "st twincat": _("structured text, TwinCAT"), "st scl": _("structured text, Siemens TIA"), "st iec": _("structured text, IEC 61131-3 second edition"), siemens: "Siemens SINUMERIK", beckhoff: "Beckhoff", linuxcnc: "LinuxCNC", heidenhain: "Heidenhain", fanuc: "Fanuc", haas: "Haas", okuma: "Okuma", klipper: "Klipper", onnx: "ONNX" };
-let state = null, seen = {}, drawn = 0, shownRun = "", figures = 0;
+let state = null, seen = {}, shownRun = "", chosenRun = 0, figures = 0;
 
 function alarm(text = "") { $("alarm").textContent = text; $("alarm").hidden = !text; if (text) $("alarm").scrollIntoView({ block: "nearest" }); }
 function element(tag, text = "", kind = "", ...inner) { const e = make(tag, kind, text); e.append(...inner); return e; }
@@ -50,6 +50,14 @@ function choices(name, options) {
   return element("ul", "", "", ...options.map(o => element("li", "", "", button(_("use this"), () => answer(name, [o.remedy])), " ", element("code", o.toml.replaceAll("\n", "; ")))));
 }
 
+function sheets(name, found) {  // of a workbook
+  if (!found.sheets) return "";
+  const input = element("select");
+  for (const sheet of ["", ...found.sheets]) input.append(new Option(sheet || _("found automatically"), sheet, false, sheet === found.sheet));
+  input.addEventListener("change", () => answer(name, [{ read: { sheet: input.value } }]));
+  return element("p", "", "", element("label", _("Sheet") + " ", "", input));
+}
+
 function draw(name) {  // the card of a recording
   const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
   const remove = button(_("Remove"), () => removeFile(name)); remove.title = _("The file stays in the project's folder.");
@@ -60,10 +68,11 @@ function draw(name) {  // the card of a recording
   if (!found) { card.append(element("p", _("reading ..."), "quiet")); return; }
   const undoing = found.mapping ? button(_("Undo the last change"), () => undo(name)) : "";
   if (found.error) {
-    card.append(element("p", found.error, "trouble"), found.options.length ? element("p", _("Which of these is right?")) : element("p", _("This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading."), "quiet"), choices(name, found.options), undoing);
+    card.append(element("p", found.error, "trouble"), found.options.length ? element("p", _("Which of these is right?")) : element("p", _("This file cannot be used as it is. Export it again from the logger as a table: a heading row with units, then one row per reading."), "quiet"), choices(name, found.options), sheets(name, found), found.columns ? scrolling(preview(name, found.columns)) : "", undoing);
     return;
   }
-  card.append(element("p", found.summary), scrolling(preview(name, found.columns)));
+  card.append(element("p", found.summary), sheets(name, found), scrolling(preview(name, found.columns)));
+  if (found.notes.length) card.append(element("h3", _("Notes on reading")), element("ul", "", "", ...found.notes.map(n => element("li", n))));
   for (const q of found.questions) card.append(element("p", q.text, "warning"), choices(name, q.options));
   if (found.findings.length) card.append(element("h3", _("Found in the data")), element("ol", "", "", ...found.findings.map(f => {
     const line = element("li", "", f.severity, element("strong", _(f.severity) + " "), `${f.channel} ${f.text} `);
@@ -93,6 +102,7 @@ function changeColumn(name, c) {  // dialog: quantity, unit, sensitivity
   const close = () => box.close(), label = (text, e) => element("label", text + " ", "", e);
   const save = button(_("Change"), () => {
     const channel = c.channel || c.heading.replace(/[^\p{L}\p{N}_-]+/gu, "_") || `column_${c.number}`, own = columnsOf(name).filter(o => o.heading === c.heading).length === 1;
+    if (role.value === "time") { close(); return answer(name, [{ time: { column: own ? c.heading : c.number, unit: unit.value } }]); }
     const said = role.value === "ignore" || role.value === "cycle" ? { role: role.value } : { role: role.value, unit: unit.value, scale: Number(scale.value) };
     close(); answer(name, [{ columns: { [channel]: { column: own ? c.heading : c.number, ...said } } }]);
   }, "main");
@@ -145,6 +155,7 @@ const startRun = quietly(async event => {
   const usualOnes = usualInputs(), asUsual = [...document.querySelectorAll("#inputs input")].every(i => i.checked === Boolean(usualOnes[i.value]));
   for (const [key, value, usual] of [["targets", targets, targets.length === all], ["inputs", inputs, asUsual], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
   $("progress").replaceChildren(_("starting ..."));
+  chosenRun = 0;
   const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
   try {
     await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
@@ -158,7 +169,7 @@ function minutes(s) { return s < 90 ? `${Math.max(1, Math.round(s))} s` : `${Mat
 function progress(run) {
   const box = $("progress"), running = run && run.state === "running";
   $("stop").hidden = !running;
-  if (state.trouble && !running && run?.state !== "failed") return box.replaceChildren(element("p", state.trouble, "failed"));
+  if (state.trouble && !running) return box.replaceChildren(element("p", state.trouble, "failed"));
   if (!run) return box.replaceChildren();
   if (!running) return box.replaceChildren(run.error ? element("p", _("Run {number} {state}: {error}", { number: run.number, state: _(run.state), error: run.error }), run.state) : "");
   const bar = element("progress"), spent = Date.now() / 1000 - run.step_began;
@@ -182,7 +193,7 @@ const verdict = quietly(async run => {
   $("verdict").replaceChildren(element("h2", _("Result of run {number}, on unseen data", { number: run.number })),
     scrolling(element("table", "", "", element("thead", "", "", element("tr", "", "", ...head.map(h => element("th", h)))), element("tbody", "", "", ...body))),
     element("p", "", "", link(run, "comparison.html", _("All methods, with curves and reasons")), " · ", link(run, "check.html", _("Check of the data")), " · ", link(run, "model.json", _("Model file"))));
-  deployForm(run);
+  deployForm(run, told);
   document.dispatchEvent(new CustomEvent("result", { detail: { run, results: shown } }));
 });
 function link(run, name, text) { const a = element("a", text); a.href = `runs/${run.number}/${name.split("/").map(encodeURIComponent).join("/")}`; a.target = "_blank"; return a; }
@@ -190,20 +201,36 @@ function link(run, name, text) { const a = element("a", text); a.href = `runs/${
 function runsTable(runs) {
   $("runs").tBodies[0].replaceChildren(...[...runs].reverse().map(r => {
     const files = r.steps.flatMap(s => s.files).filter(f => f.endsWith(".html")), said = r.steps.filter(s => s.name === "compare").map(s => s.text).join(" ");
-    return element("tr", "", "", element("td", String(r.number)), element("td", _(r.state), r.state), element("td", date(r.began)), element("td", r.error || said), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
+    const without = r.steps.filter(s => s.error).map(s => _("Without {step}: {error}", { step: s.name, error: s.error })).join(" ");
+    return element("tr", "", "", element("td", String(r.number)), element("td", _(r.state), r.state), element("td", date(r.began)), element("td", r.error || [said, without].filter(Boolean).join(" ")), element("td", "", "", ...files.flatMap(f => [link(r, f, f.replace(".html", "")), " "])));
   }));
   $("command").textContent = state.command;
 }
 
 // -- deployment --------------------------------------------------------------------------------------------------------
 
-function deployForm(run) {
+const fitted = () => state.runs.filter(r => r.state !== "running" && r.steps.some(s => s.name === "fit"));
+
+function deployForm(run, told) {
   if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
-  const steps = run.steps.filter(s => s.name === "export");
-  $("exported").textContent = _("Exported are the models of run {number}: {text}", { number: run.number, text: run.steps.filter(s => s.name === "compare").map(s => s.text).join(" ") });
-  $("package").replaceChildren(...steps.map(s => packageCard(run, s)));
+  $("exported").replaceChildren(...fitted().reverse().map(r => new Option(_("{number}, of {began}", { number: r.number, began: date(r.began) }), r.number, false, r.number === run.number)));
+  $("verdicts").textContent = run.steps.filter(s => s.name === "compare").map(s => s.text).join(" ");
+  const steps = run.steps.filter(s => s.name === "export"), taken = [];
+  $("package").replaceChildren(...steps.map(s => s.error ? element("p", s.error, "trouble") : packageCard(run, s)));
   if (!steps.length) $("package").append(element("p", _("Nothing is exported yet."), "quiet"));
+  const chosen = Object.fromEntries(((state.settings.export || {}).axes || []).map(text => text.split("=")));
+  const letters = ((told.results.fit || {}).models || []).map(({ target }) => {  // as chosen before, else as named, each axis once
+    const letter = Object.keys(chosen).length ? chosen[target] : (told.axes || {})[target], input = element("select");
+    for (const [value, text] of [["", _("not corrected")], ["X", "X"], ["Y", "Y"], ["Z", "Z"]]) input.append(new Option(text, value, false, value === letter && !taken.includes(letter)));
+    if (letter) taken.push(letter);
+    input.dataset.target = target;
+    return element("p", "", "", element("label", `${target} `, "", input));
+  });
+  $("axes").replaceChildren($("axes").querySelector("legend"), ...letters);
+  $("axes").dataset.driven = (told.driven || []).join(" ");
+  showAxes();
 }
+function showAxes() { $("axes").hidden = !$("axes").dataset.driven.split(" ").includes($("to").value.split(" ")[0]); }
 
 function packageCard(run, step) {
   const { files, text } = step, folder = files.length ? files[0].split("/")[0] : "", guides = files.filter(f => f.endsWith(".md"));
@@ -216,11 +243,13 @@ function packageCard(run, step) {
 
 const exportModels = quietly(async event => {
   event.preventDefault();
+  const [to, dialect] = $("to").value.split(" "), { axes: _none, ...kept } = state.settings.export || {};
+  const axes = [...$("axes").querySelectorAll("select")].filter(s => s.value).map(s => `${s.dataset.target}=${s.value}`);
+  if (!$("axes").hidden && !axes.length) return alarm(_("State the axis of at least one deviation."));
   $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
-  const [to, dialect] = $("to").value.split(" ");
   try {
-    await api("api/settings", "PUT", { export: { ...(state.settings.export || {}), to, dialect: dialect || "" } });
-    await api("api/runs", "POST");
+    await api("api/settings", "PUT", { export: { ...kept, to, dialect: dialect || "", ...($("axes").hidden ? {} : { axes }) } });
+    await api(`api/runs?number=${$("exported").value}`, "POST");
   } catch (e) { shownRun = ""; render(state); throw e; }  // refused: not "exporting ..." for ever
 });
 
@@ -230,8 +259,8 @@ function render(found) {
   state = found;
   if (document.activeElement !== $("name")) $("name").value = state.settings.name || "";
   const last = state.runs[state.runs.length - 1];
-  files(); judgeForm(); progress(last); runsTable(state.runs);
-  verdict([...state.runs].reverse().find(r => r.state !== "running" && r.steps.some(s => s.name === "fit")));  // a later step may have failed
+  files(); judgeForm(); progress(state.runs.find(r => r.state === "running") || last); runsTable(state.runs);
+  verdict(fitted().find(r => r.number === chosenRun) || fitted().pop());
   document.dispatchEvent(new CustomEvent("state"));
 }
 
@@ -255,7 +284,9 @@ $("to-judge").addEventListener("click", () => open($("tab-judge")));
 $("settings").addEventListener("submit", startRun);
 $("language").addEventListener("change", quietly(async e => { await api("api/settings", "PUT", { language: e.target.value }); location.reload(); }));
 $("target").addEventListener("submit", exportModels);
-$("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs[state.runs.length - 1].number}`, "DELETE")));
+$("to").addEventListener("change", showAxes);
+$("exported").addEventListener("change", () => { chosenRun = Number($("exported").value); render(state); });
+$("stop").addEventListener("click", quietly(() => api(`api/runs/${state.runs.find(r => r.state === "running").number}`, "DELETE")));
 $("name").addEventListener("change", quietly(e => api("api/settings", "PUT", { name: e.target.value })));
 addEventListener("DOMContentLoaded", () => {  // when the other scripts listen
   api("api/project").then(render).catch(() => 0);

@@ -68,7 +68,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     return element("div", "", "card", element("h4", title), svg, legend, said);
   }
 
-  function sensors(results) {
+  function sensors(run, results) {
     const own = overall(results.compare).filter(r => r.rms_um != null), chosen = ((results.sensors || {}).choices || []), box = element("div", "", "charts");
     for (const c of chosen) {
       const points = c.points.filter(p => p.error != null);
@@ -76,7 +76,8 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     }
     for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, count: r.n_sensors, error: r.rms_um }))));
     const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
-    return [element("h3", _("Number of sensors against error on unseen data")), ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
+    const failed = run.steps.filter(s => s.name === "select" && s.error).map(s => element("p", s.error, "trouble"));
+    return [element("h3", _("Number of sensors against error on unseen data")), ...failed, ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
   }
 
   document.addEventListener("result", e => {
@@ -84,6 +85,6 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const head = [_("deviation"), _("method"), _("verdict"), "RMS [um]", _("without [um]"), _("worst cycle [um]"), _("band [um]"), _("with noise [um]"), _("sensor lost [um]"), _("inputs"), ""], kept = element("div");
     kept.id = "curves";
     const rows = overall(results.compare).map(r => methodRow(run, r, used.has(JSON.stringify([r.target, r.model]))));
-    $("details").replaceChildren(element("h3", _("All methods, RMS on unseen data")), table(head, rows), kept, ...sensors(results));
+    $("details").replaceChildren(element("h3", _("All methods, RMS on unseen data")), table(head, rows), kept, ...sensors(run, results));
   });
 }

@@ -23,19 +23,19 @@
     }
     await api("api/settings", "PUT", { plan });
     await api("api/runs", "POST");
-    $("planned").replaceChildren(element("p", _("Planning; the progress is shown in step 2 ..."), "quiet"));
+    $("planned").replaceChildren(element("p", _("Planning ..."), "quiet"));
   }));
 
   document.addEventListener("result", e => {
     const { run, results } = e.detail, steps = run.steps.filter(s => s.name === "plan"), step = steps[steps.length - 1];
     const range = c => _("{value} ({low} to {high})", { value: um(c.gain_um), low: um(c.gain_range_um[0]), high: um(c.gain_range_um[1]) });
-    if (step && results.plan) {
+    if (step && step.error) $("planned").replaceChildren(element("p", step.error, "trouble"));
+    else if (step && results.plan) {
       const links = step.files.filter(f => !f.endsWith(".json")).flatMap(f => [link(run, f, f.split("/")[1]), " · "]).slice(0, -1);
       for (const a of links) if (a.href && !a.href.endsWith(".png")) a.download = a.textContent;
       $("planned").replaceChildren(element("h2", _("The next test")), element("p", step.text), element("p", _("NC program, measurement sheet and figure:") + " ", "", ...links),
         element("h3", _("Tests considered")), table([_("test"), _("expected gain [um]"), _("new")], results.plan.candidates.map(c => [c.words, range(c), c.news])));
     } else $("planned").replaceChildren(element("p", _("Nothing is planned yet."), "quiet"));
-    if (run.state === "failed") $("planned").prepend(element("p", run.error, "trouble"));
     live(run);
   });
 

@@ -214,11 +214,18 @@ def vectors(reduced: Reduced) -> list[tuple[float, ...]]:
 
 
 def find_axis(target: str, named: dict[str, str]) -> str:
-    """Return the letter of the axis of a target, as `named` or by its name; empty if neither defines it."""
+    """Return the letter of the axis of a target, as `named` or by its name; empty if neither defines it.
+
+    A name defines it by its beginning (``z_um``, ``X1_um``), or by the only letter of an axis among its words
+    (``drift_Z_um``, ``dZ_top_um``).
+    """
     if target in named:
         return named[target]
-    found = re.fullmatch(r"([xyz])([\d_].*)?", target, re.IGNORECASE)
-    return found[1].upper() if found else ""
+    if begins := re.fullmatch(r"d?([xyz])([\d_].*)?", target, re.IGNORECASE):
+        return begins[1].upper()
+    words = re.split(r"[\W_]+", target)
+    letters = {found[1].upper() for word in words if (found := re.fullmatch(r"d?([xyz])\d*", word, re.IGNORECASE))}
+    return letters.pop() if len(letters) == 1 else ""
 
 
 def in_mm(um: float) -> str:

@@ -17,6 +17,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
+from thermocomp.recordings.headings import is_time_name
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
     FileLayout,
@@ -39,6 +40,8 @@ from thermocomp.recordings.readers.unzipped import check_unzipped
 _SAMPLE = 100
 _SAMPLE_CELLS = 10_000
 _SAMPLE_PLACES = 10_000
+#: number of rows of a table with times that may be a recording, however long the tables of other sheets are
+_SHORT = 10
 #: maximum number of cells stored as objects; further ones are converted to numbers
 _CHUNK = 200_000
 #: number of bits of an integer that is too large for a float
@@ -103,7 +106,10 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     for name, open_rows in sheets.items():
         with closing(open_rows()) as rows:
             sizes[name] = _count_rows(_sample(rows))
-    likely = [name for name, size in sizes.items() if size and 2 * size >= max(sizes.values())]
+    most = max(rows for rows, _ in sizes.values())
+    likely = [
+        name for name, (rows, timed) in sizes.items() if rows and (2 * rows >= most or (timed and rows >= _SHORT))
+    ]
     if len(likely) > 1:
         raise RecordingError(
             f"{path}: the sheets {', '.join(map(repr, likely))} all hold a table; state which in a mapping, such as "
@@ -114,14 +120,18 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
     return name, (f"sheet {name!r} of {names} is read",)
 
 
-def _count_rows(rows: Sequence[Sequence[str]]) -> int:
-    """Count the rows of a table of two or more columns of values; names with one value each are a cover sheet."""
+def _count_rows(rows: Sequence[Sequence[str]]) -> tuple[int, bool]:
+    """Count the rows of a table of two or more columns of values, and return whether it has times.
+
+    Names with one value each are no table, but a cover sheet.
+    """
     layout = find_layout(rows)
     if layout is None:
-        return 0
+        return 0, False
     body = rows[layout.begin :]
     columns, timed = find_columns(body)[1], find_timed(body)
-    return sum(is_row(row, columns, timed) for row in body) if len(columns) > 1 else 0
+    count = sum(is_row(row, columns, timed) for row in body) if len(columns) > 1 else 0
+    return count, bool(timed) or any(map(is_time_name, rows[layout.heading]))
 
 
 def _sample(rows: Iterable[Row]) -> list[list[str]]:
