@@ -279,7 +279,7 @@ def test_the_whole_way_in_a_browser(tmp_path: Path) -> None:
         page.locator("#tab-deploy").click()
         page.select_option("#to", "linuxcnc")
         page.route(
-            "**/api/runs", lambda route: route.fulfill(status=422, json={"detail": "refused for a test"}), times=1
+            "**/api/runs?*", lambda route: route.fulfill(status=422, json={"detail": "refused for a test"}), times=1
         )
         page.locator("#target .main").press("Enter")
         page.get_by_text("refused for a test").wait_for()

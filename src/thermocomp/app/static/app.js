@@ -59,6 +59,7 @@ function sheets(name, found) {  // of a workbook
 }
 
 function draw(name) {  // the card of a recording
+  offerNext();
   const found = seen[name], card = document.querySelector(`[data-file="${CSS.escape(name)}"]`);
   const remove = button(_("Remove"), () => removeFile(name)); remove.title = _("The file stays in the project's folder.");
   const use = element("select"), assessed = (state.settings.assess || []).some(r => r.file === name);
@@ -122,8 +123,9 @@ const files = quietly(async () => {
     const card = element("article", "", "card"); card.dataset.file = name; box.append(card); draw(name);
     if (!seen[name]) { seen[name] = await api(place(name)); draw(name); }
   }
-  $("to-judge").hidden = !learned.length;
+  offerNext();
 });
+function offerNext() { const found = (state.settings.recordings || []).map(r => seen[r.file]); $("to-judge").hidden = !found.length || found.some(f => !f || f.error); }
 
 // -- judging -----------------------------------------------------------------------------------------------------------
 
