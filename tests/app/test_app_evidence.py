@@ -50,7 +50,7 @@ def test_evidence_in_a_browser(finished_project: Path) -> None:
         page.locator("#tab-judge").press("Enter")  # a mouse that rests on curves would dim their names
         page.wait_for_selector("#details table")
         assert page.locator("#details table tbody tr").count() == 2
-        page.get_by_role("button", name="curves of averaged for z_um").press("Enter")
+        page.get_by_role("button", name="averaged (used): curves for z_um").press("Enter")
         page.wait_for_selector("#curves canvas")
         page.locator("#curves .zoom button", has_text="2 (2500").press("Enter")
         assert "RMS" in page.inner_text("#cycle")
@@ -184,7 +184,7 @@ def test_names_that_are_scripts_never_run(tmp_path: Path) -> None:
             page.locator(summary).press("Enter")
         assert page.locator("#sketch g").first.get_attribute("aria-label") == f"{script}t1_C, not placed"
         page.locator("#tab-judge").press("Enter")
-        page.locator("#details button", has_text="curves").first.press("Enter")
+        page.locator("#details td button").first.press("Enter")
         page.wait_for_selector("#curves canvas")
         page.locator("#curves .zoom button", has_text=script).first.press("Enter")
         page.locator("#details circle").first.press("Enter")

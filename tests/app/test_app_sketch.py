@@ -36,7 +36,7 @@ def test_sensors_are_placed(tmp_path: Path) -> None:
         page.mouse.move(area["x"] + 0.25 * area["width"], area["y"] + 0.5 * area["height"], steps=3)
         page.mouse.up()
         page.wait_for_function("'t2_C' in state.settings.sketch.places")
-        assert sketch(folder)["places"]["t2_C"] == pytest.approx([0.25, 0.6], abs=0.01)  # 240 units high, of which 200
+        assert sketch(folder)["places"]["t2_C"] == pytest.approx([0.25, 0.57], abs=0.01)  # 228 units high, of which 200
         outline = page.locator("#sketch path").first.get_attribute("d")
         page.select_option("#machine", "lathe")
         assert page.locator("#sketch path").first.get_attribute("d") != outline

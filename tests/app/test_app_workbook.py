@@ -53,7 +53,7 @@ def test_from_a_workbook_to_two_controllers(tmp_path: Path) -> None:
         page.set_input_files("#chosen", file)
         page.wait_for_selector("#recordings canvas", timeout=120_000)
         card = page.locator("#recordings .card")
-        assert "left out: Kühlmittel" in card.inner_text()
+        assert "ignored by the mapping: Kühlmittel" in card.inner_text()
         card.get_by_label("Sheet").select_option("Deckblatt")
         page.wait_for_selector("#recordings .trouble", timeout=120_000)
         assert "K. Hartmann" in card.locator("table").inner_text(), "what the sheet holds"

@@ -1,7 +1,7 @@
 "use strict";
 // Places of the temperature sensors on a sketch of the machine: dragged, or moved by keys; kept in project.toml.
 {
-  const W = 300, H = 200, STEP = 0.02, svg = $("sketch").querySelector("svg");
+  const W = 300, H = 200, STEP = 0.02, ROW = 14, svg = $("sketch").querySelector("svg");
   const MACHINES = {  // outlines, each seen from the side
     mill: ["M30 170H270V190H30Z", "M190 30H250V170H190Z", "M110 35H190V85H110Z", "M135 85H165V110H135Z", "M145 110H155V125H145Z", "M70 140H185V155H70Z", "M95 155H160V170H95Z"],
     lathe: ["M20 140H280V185H20Z", "M30 55H105V140H30Z", "M105 75H125V125H105Z", "M215 80H270V140H215Z", "M190 97H215V103H190Z", "M140 120H185V140H140Z", "M155 100H172V120H155Z"],
@@ -17,7 +17,7 @@
   const within = v => Math.round(Math.min(Math.max(v, 0), 1) * 1000) / 1000;
 
   function put(g, name, k) {
-    const free = !places[name], [x, y] = free ? [18 + 70 * (k % 4), H + 14 + 16 * (Math.floor(k / 4) % 2)] : [places[name][0] * W, places[name][1] * H];
+    const free = !places[name], [x, y] = free ? [10 + 97 * (k % 3), H + ROW * (1 + Math.floor(k / 3))] : [places[name][0] * W, places[name][1] * H];
     g.setAttribute("transform", `translate(${x} ${y})`);
     g.classList.toggle("free", free);
     g.setAttribute("aria-label", free ? _("{name}, not placed", { name }) : _("{name}, {x} % from the left, {y} % from the top", { name, x: Math.round(100 * places[name][0]), y: Math.round(100 * places[name][1]) }));
@@ -25,7 +25,7 @@
 
   function sensor(name, k) {
     const g = shape("g", { tabindex: 0, role: "button" });
-    g.append(shape("circle", { r: 5 }), shape("text", { x: 8, y: 3 }, name.length > 14 ? name.slice(0, 13) + "…" : name));
+    g.append(shape("circle", { r: 5 }), shape("text", { x: 8, y: 3 }, name.length > 18 ? name.slice(0, 17) + "…" : name));
     put(g, name, k);
     let waiting = 0;
     g.addEventListener("keydown", e => {
@@ -49,6 +49,7 @@
 
   function draw(names) {
     const focused = [...svg.querySelectorAll("g")].indexOf(document.activeElement), dots = names.map(sensor);
+    svg.setAttribute("viewBox", `0 0 ${W} ${H + ROW * (1 + Math.ceil(names.length / 3))}`);  // room for those not placed
     svg.replaceChildren(...MACHINES[$("machine").value].map(d => shape("path", { d })), ...dots);
     if (dots[focused]) dots[focused].focus();
   }

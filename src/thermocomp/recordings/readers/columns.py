@@ -191,7 +191,7 @@ def _plan_mapped(
         used.add(index)
         if rule.role == "ignore":
             said = rule.reason if name in rule.reason else f"{name}: {rule.reason}"
-            notes.extend([f"left out: {said}"] if rule.reason else [])
+            notes.extend([f"ignored by the mapping: {said}"] if rule.reason else [])
             continue
         other = tables.setdefault(index, name)
         if other != name:
