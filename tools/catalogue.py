@@ -65,6 +65,11 @@ WORDS = (
     *("day/month/year", "month/day/year", "year/month/day", "year/day/month"),
     "{rows} at the end is not part of the table, and left out",
     "{rows} at the end are not part of the table, and left out",
+    # sets of sensors
+    "no set of temperatures is clearly better than no compensation; the smallest error: {error}",
+    *("one of the targets", "the target"),
+    *("{n} sensors cost {what} (means over the blocks)", "{n} sensor costs {what} (means over the blocks)"),
+    ", {none:.2f} without compensation: the model does not help on unseen cycles",
     # how a test began, axes, contributions to the measurement uncertainty
     *("cold", "continued", "rezeroed", "known", "moved", "stood still", "not recorded"),
     *("zero", "repeatability", "sensitivity", "misalignment", "probe", "mounting", "instrument drift", "expansion"),

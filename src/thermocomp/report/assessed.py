@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from thermocomp.core.messages import Message, join
+from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.diagnostics import Collinearity
@@ -83,7 +84,7 @@ def _fitted_with(judged: Judged) -> list[str]:
 
 def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
     fitted = {Message("when fitted"): judged.models[0].validity, Message("these recordings"): judged.validity}
-    known = {name: v for name, v in fitted.items() if v is not None}
+    known: dict[str, Validity] = {name: v for name, v in fitted.items() if v is not None}
     if not known:
         return None
     table = coverage.table(known)
