@@ -27,7 +27,17 @@ msgstr ""
 PAGES = ("report", "check", "selection", "assessed", "targets", "recordings", "table", "iso230", "volumetric")
 #: words that the code writes and a page translates: verdicts, severities, kinds of findings, quantities
 WORDS = (
-    *("accepted", "accepted for this duty", "unproven", "refused", "trouble", "warning", "info", "nothing"),
+    *(
+        "accepted",
+        "accepted for this duty",
+        "unproven",
+        "refused",
+        "not unseen",
+        "trouble",
+        "warning",
+        "info",
+        "nothing",
+    ),
     *("clock", "step", "swapped", "interference", "leak", "offset", "left out", "compensation", "duplicate channel"),
     *("implausible", "constant", "short", "gap", "irregular sampling", "no cycle", "missing-value code", "time unit"),
     *("missing values", "probed", "quantised", "stuck", "spike", "unit", "turning start", "not zeroed", "loggers"),
@@ -38,6 +48,31 @@ WORDS = (
     *("no compensation, both re-zeroed at the start of the block", "no compensation (slow changes removed from both)"),
     "the mean curve of the other cycles or files over time",
     "Conditions covered by the judged cycles or files",
+    # figures of merit
+    *("Mean absolute residual.", "Root mean square of the residual.", "Largest absolute residual."),
+    "Range of the residual, as ISO 230-3 states a drift.",
+    "Reduction of the RMS relative to no compensation, in percent; negative means harm.",
+    # places in files, orders of dates
+    *(
+        "row {first}",
+        "rows {first}",
+        "rows {first} to {last}",
+        "line {first}",
+        "lines {first}",
+        "lines {first} to {last}",
+    ),
+    *("{rows} above the headings is skipped", "{rows} above the headings are skipped"),
+    *("day/month/year", "month/day/year", "year/month/day", "year/day/month"),
+    "{rows} at the end is not part of the table, and left out",
+    "{rows} at the end are not part of the table, and left out",
+    # sets of sensors
+    "no set of temperatures is clearly better than no compensation; the smallest error: {error}",
+    *("one of the targets", "the target"),
+    *("{n} sensors cost {what} (means over the blocks)", "{n} sensor costs {what} (means over the blocks)"),
+    ", {none:.2f} without compensation: the model does not help on unseen cycles",
+    # how a test began, axes, contributions to the measurement uncertainty
+    *("cold", "continued", "rezeroed", "known", "moved", "stood still", "not recorded"),
+    *("zero", "repeatability", "sensitivity", "misalignment", "probe", "mounting", "instrument drift", "expansion"),
 )
 
 
@@ -69,6 +104,8 @@ def _messages(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
             text, known = node.args[0], node.func.id in ("Message", "Column")
+            if node.func.id == "Method":
+                text, known = node.args[1], True
             for part in ast.walk(text) if known else [text] if node.func.id == "translate" else []:
                 if isinstance(part, ast.Constant) and isinstance(part.value, str) and _is_text(part.value):
                     yield part.value

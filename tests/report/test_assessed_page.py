@@ -21,6 +21,7 @@ from thermocomp.recordings.readers import recordings
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
 from thermocomp.report import assessed, faults
+from thermocomp.report.language import translate
 from thermocomp.report.layout import in_um
 from thermocomp.report.sections import Section
 from thermocomp.runtime.watchstate import WORDS
@@ -56,10 +57,10 @@ def words(page: str) -> str:
 def test_the_verdict_of_each_cycle_is_there(judged: Judged, page: str) -> None:
     (whole,) = judged.overall()
     told = words(page)
-    stated = f"({judged.stated['z_um']:.2f} um stated in the model file)"
-    here, none = f"{whole.metric('rms'):.2f} um RMS", f"{whole.none_metric('rms'):.2f} um."
+    stated = f"({judged.stated['z_um']:.2f} µm stated in the model file)"
+    here, none = f"{whole.metric('rms'):.2f} µm RMS", f"{whole.none_metric('rms'):.2f} µm."
     assert f"z_um: {whole.word}, {here} {stated} instead of {none}" in told
-    assert whole.reason in told
+    assert translate(whole.reason) in told
     for unit in whole.verdict.units:
         assert unit.name in told
         assert f"{in_um(unit.rms)} / {in_um(unit.none_rms)}" in told

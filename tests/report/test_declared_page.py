@@ -60,7 +60,7 @@ def test_compare_and_assess_state_them(folder: Path, out: Callable[..., str]) ->
     figures = [result.none_metric("rms"), result.none_metric("max_abs"), result.metric("rms"), result.metric("max_abs")]
     assert [f"{v:.2f} ± 0.80" for v in figures if f" {v:.2f} ± 0.80 " not in page] == []
     assert page.index("Test: machine VMC <3>, serial 4711") < page.index("Use ols for z_um")
-    assert WORKPIECE in page
+    assert WORKPIECE.replace("um/", "µm/").replace("degC", "°C") in page
     assert "Not stated, so not contained: sensitivity_pct, misalignment_deg" in page
 
     out("fit", "bare.csv", *study, "--model", "ols", "-o", "model.json")

@@ -47,7 +47,7 @@ def test_a_terminal_writes_the_unit_and_hundredths(capsys: pytest.CaptureFixture
 
 def test_a_page_escapes_and_writes_no_more_than_makes_sense() -> None:
     page = drawn(TABLE)
-    assert '<th class="l">model</th><th>RMS [um]</th><th>rows</th>' in page
+    assert '<th class="l">model</th><th>RMS [µm]</th><th>rows</th>' in page
     assert '<tr class="best"><td class="l">a [b]</td><td>123</td><td>10</td>' in page
     assert '<td class="l">&lt;c&gt;</td><td>0.00</td>' in page
     assert "<td>–</td>" in page

@@ -148,7 +148,7 @@ def test_curves_are_those_of_the_result(samples: Samples, recording: Recording) 
     assert after["y"] == pytest.approx(a.measured - a.predicted, abs=0.51 * 10 ** -panel["digits"])
     assert [c[2] for c in panel["cycles"]] == [c.name for c in recording.cycles]
     for (_, _, _, told), block in zip(panel["cycles"], [b for b in judged.assessments if not b.overall], strict=False):
-        assert told.startswith(f"RMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um")
+        assert told.startswith(f"RMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} µm")
 
 
 def test_peaks_and_gaps_stay_where_points_are_left_out() -> None:

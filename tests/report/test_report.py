@@ -106,7 +106,7 @@ def test_what_disturbances_do_is_told_beside_the_verdict(
     assert told
     assert not [c for c in cautions(bad) if "worse than no compensation" in c]  # it is said once
     assert all("loss of spindle_rpm" in c for c in told)
-    assert re.search(r"noise of 0.4 degC, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
+    assert re.search(r"noise of 0.4 °C, (loss of \w+, )*loss of spindle_rpm", html.render(bad, [recording]))
     assert "worse than no compensation with" in page
     print_items(printed.comparison(bad), Console(width=400))
     assert all(c in capsys.readouterr().out for c in told[:1])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message
 from thermocomp.judging.results import Assessment
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.starts import Start
@@ -74,10 +75,15 @@ def residuals_of(assessments: Sequence[Assessment], recordings: Sequence[Recordi
 def describe(a: Assessment) -> str:
     """Return an assessment in a sentence."""
     if a.failure:
-        return f"{a.target}: {a.reason}."
-    return (
-        f"{a.target}: {a.model} {a.word}, {a.metric('rms'):.2f} um RMS instead of {a.none_metric('rms'):.2f} um "
-        f"({a.reason})."
+        return Message("{target}: {what}.", target=a.target, what=a.reason)
+    return Message(
+        "{target}: {model} {word}, {rms:.2f} um RMS instead of {none:.2f} um ({reason}).",
+        target=a.target,
+        model=a.model,
+        word=Message(a.word),
+        rms=a.metric("rms"),
+        none=a.none_metric("rms"),
+        reason=a.reason,
     )
 
 

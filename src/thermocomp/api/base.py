@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from thermocomp.core.messages import Message, join
 from thermocomp.files.draft import write_text
 from thermocomp.files.pdf import write_pdf
 
@@ -58,4 +59,4 @@ class Paged(ABC):
 
 def told_trouble(trouble: Sequence[str]) -> list[str]:
     """Return the data-quality problems of recordings as a sentence; empty if there are none."""
-    return [f"Trouble: {'; '.join(trouble)}."] if trouble else []
+    return [Message("Trouble: {what}.", what=join(trouble, "; "))] if trouble else []

@@ -10,6 +10,7 @@ import pandas as pd
 from thermocomp.api.base import Paged, Result
 from thermocomp.api.inputs import Given, recordings_of
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message, join
 from thermocomp.recordings.checks import quality
 from thermocomp.recordings.checks.findings import SEVERITIES, Finding
 from thermocomp.recordings.checks.offsets import compare_starts
@@ -77,11 +78,17 @@ class CheckedRecordings(Result, Paged):
         return checks.render(self.recordings, self.findings)
 
     def __str__(self) -> str:
-        worst = (
-            f"{r.name}: " + (f"{found[0].channel} {found[0].text}".strip() if found else "nothing wrong found")
+        worst = [
+            Message(
+                "{name}: {what}",
+                name=r.name,
+                what=join([*filter(None, (found[0].channel, found[0].text))], " ")
+                if found
+                else Message("nothing wrong found"),
+            )
             for r, found in zip(self.recordings, self.findings, strict=True)
-        )
-        return ". ".join(worst) + "."
+        ]
+        return join([join(worst or [""], ". "), "."])
 
 
 def check(recordings: Given, *, mapping: str | Path | Mapping | None = None) -> CheckedRecordings:

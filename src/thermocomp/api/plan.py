@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from thermocomp.api import testprogram
-from thermocomp.api.base import Result
+from thermocomp.api.base import Result, told_trouble
 from thermocomp.api.inputs import Given, LeaveOne, Prepared, Starts, judging_of, prepare, recordings_of, trouble_of
 from thermocomp.api.keywords import Listener, silent
 from thermocomp.api.testprogram import Dialect
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message, join
 from thermocomp.core.zero import Zeroing
 from thermocomp.judging.planning import learningcurve, planning
 from thermocomp.judging.planning.learningcurve import LearningCurve
@@ -136,19 +137,22 @@ class Planned(Result):
     @property
     def so_far(self) -> str:
         """Return the learning curve as a sentence; empty without it."""
-        return "" if self.curve is None else f"Unseen cycles so far: {self.curve.words}."
+        return "" if self.curve is None else Message("Unseen cycles so far: {what}.", what=self.curve.words)
 
     def __str__(self) -> str:
         best = self.next
-        why = f" ({best.news})" if best.news else ""
         low, high = best.gain_range
-        found = [
-            f"Record next: {best.trial.words}; expected gain {best.gain:.2f} um ({low:.2f} to {high:.2f}) of "
-            f"{self.plan.expected:.2f} um, calculated over all tests of the grid{why}."
-        ]
-        return " ".join(
-            [*found, *filter(None, [self.so_far]), *([f"Trouble: {'; '.join(self.trouble)}."] if self.trouble else [])]
+        found = Message(
+            "Record next: {test}; expected gain {gain:.2f} um ({low:.2f} to {high:.2f}) of {expected:.2f} um, "
+            "calculated over all tests of the grid{why}.",
+            test=best.trial.words,
+            gain=best.gain,
+            low=low,
+            high=high,
+            expected=self.plan.expected,
+            why=Message(" ({news})", news=best.news) if best.news else "",
         )
+        return join([found, *filter(None, [self.so_far]), *told_trouble(self.trouble)], " ")
 
 
 def _candidate(c: Candidate) -> dict[str, Any]:

@@ -265,12 +265,8 @@ class FittedModels(Result):
         return draw_run(self.fitted.comparison.assessments, self.recordings, target or first, None)
 
     def __str__(self) -> str:
-        return " ".join(
-            [
-                *(describe(a) for a in self.fitted.comparison.overall()),
-                *told_trouble(self.trouble),
-            ]
-        )
+        told = map(describe, self.fitted.comparison.overall())
+        return join([*told, *told_trouble(self.trouble)], " ")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -343,4 +339,4 @@ class Assessed(Result, Paged):
         return assessed.render(self.judged, self.recordings)
 
     def __str__(self) -> str:
-        return " ".join([*(describe(a) for a in self.judged.overall()), *told_trouble(self.trouble)])
+        return join([*map(describe, self.judged.overall()), *told_trouble(self.trouble)], " ")

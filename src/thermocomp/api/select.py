@@ -11,6 +11,7 @@ from thermocomp.api.base import Paged, Result, told_trouble
 from thermocomp.api.inputs import Given, LeaveOne, Starts, prepare, recordings_of
 from thermocomp.api.keywords import Listener, settings_of, silent
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message, join
 from thermocomp.core.zero import Zeroing
 from thermocomp.judging import selecting
 from thermocomp.judging.choice import Choice, Settings
@@ -102,8 +103,16 @@ class Selected(Result, Paged):
         return drawn[0].figure
 
     def __str__(self) -> str:
-        chosen = (f"{c.target}: {', '.join(c.sensors) or 'no sensor'} ({c.reason})." for c in self.choices)
-        return " ".join([*chosen, *told_trouble(self.trouble)])
+        chosen = [
+            Message(
+                "{target}: {sensors} ({reason}).",
+                target=c.target,
+                sensors=", ".join(c.sensors) or Message("no sensor"),
+                reason=c.reason,
+            )
+            for c in self.choices
+        ]
+        return join([*chosen, *told_trouble(self.trouble)], " ")
 
 
 def select(

@@ -69,7 +69,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
         return {"mapping": text, "error": message, "options": options, **_raw(file, draft)}
     recording, whole = mended.recording, Draft(mended.text).mapping(file)
     findings = check(recording)
-    table = open_table(file, whole)[0]
+    table, told = open_table(file, whole)[0], {f.text for f in findings}
     ways = [located(f, recording, whole, table.headings) if f.remedy else {} for f in findings]
     return {
         "mapping": mended.text,
@@ -77,7 +77,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
         "summary": translate(_summary(recording)),
         "columns": _columns(table, whole),
         "questions": [
-            {"text": q.text, "severity": q.severity, "options": [_option(o, to_toml(o)) for o in q.options]}
+            {"text": translate(q.text), "severity": q.severity, "options": [_option(o, to_toml(o)) for o in q.options]}
             for q, answer in mended.decided
             if answer is None and q.severity in ("error", "column")
         ],
@@ -90,7 +90,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
             }
             for f, way in zip(findings, ways, strict=True)
         ],
-        "notes": [*recording.notes, *recording.changed],
+        "notes": [translate(n) for n in dict.fromkeys((*recording.notes, *recording.changed)) if n not in told],
         "targets": [c.name for c in recording.displacements],
         "inputs": {  # and whether they are inputs of the models if none are named
             **{c.name: True for c in recording.temperatures},

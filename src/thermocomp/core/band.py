@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.bounds import COEFFICIENT, LEAST, check_between
 from thermocomp.core.exceptions import SettingError
+from thermocomp.core.messages import Message
 from thermocomp.core.thresholds import THRESHOLDS
 
 FloatArray = NDArray[np.float64]
@@ -76,17 +77,26 @@ class Band:
     @property
     def words(self) -> str:
         """Short description of the band, as in all outputs."""
-        by = "by assumption" if self.basis == "assumption" else "conformal"
-        return f"{100 * self.level:g} % band {by}, {self.cycles} cycles"
+        assumed = self.basis == "assumption"
+        return Message(
+            "{level:g} % band by assumption, {n} cycles" if assumed else "{level:g} % band conformal, {n} cycles",
+            level=100 * self.level,
+            n=self.cycles,
+        )
 
     def tell(self, unit: str) -> str:
         """Return the band as text in a given unit, with its half-widths where the averaged regressions agree."""
-        rest, run = (f"{self.floor * factor:.2f} {unit}" for factor in (self.stopped, self.running))
+        rest, run = self.stopped, self.running
         if not self.speeds:
-            rest = run = f"{self.floor * max(self.stopped, self.running):.2f} {unit}"
-        return (
-            f"{self.words}: half-width at least {rest} at rest and {run} with the spindle running, more where the "
-            "averaged models disagree" + (" and far from the training data" if self.widening else "")
+            rest = run = max(rest, run)
+        return Message(
+            "{words}: half-width at least {rest:.2f} {unit} at rest and {run:.2f} {unit} with the spindle running, "
+            "more where the averaged models disagree{far}",
+            words=self.words,
+            rest=self.floor * rest,
+            run=self.floor * run,
+            unit=unit,
+            far=Message(" and far from the training data") if self.widening else "",
         )
 
     def turning(self, change: FloatArray, stopped: float = THRESHOLDS.stopped_speed) -> NDArray[np.bool_]:

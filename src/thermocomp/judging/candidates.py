@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import FitError, InputError
+from thermocomp.core.messages import Message
 from thermocomp.judging.choice import Table
 from thermocomp.judging.diagnostics import diagnose
 from thermocomp.recordings.samples import Samples
@@ -64,15 +65,18 @@ class Candidates:
         found = diagnose(values, self.y, tuple(sensors))
         raw = found.spectrum
         rows = tuple(zip(found.names, found.contributions, found.vif, strict=True))
-        caption = (
-            f"X'X of their changes: smallest eigenvalue {raw.smallest:.3g}, sum of inverse eigenvalues "
-            f"{raw.sum_inverse:.3g}, condition number {raw.condition_number:.3g}. A variance inflation factor (VIF) "
-            "above 10 means that the others carry almost the same information."
+        caption = Message(
+            "X'X of their changes: smallest eigenvalue {smallest:.3g}, sum of inverse eigenvalues {inverse:.3g}, "
+            "condition number {condition:.3g}. A variance inflation factor (VIF) above 10 means that the others carry "
+            "almost the same information.",
+            smallest=float(raw.smallest),
+            inverse=float(raw.sum_inverse),
+            condition=float(raw.condition_number),
         )
-        title = "Collinearity of the chosen sensors"
+        title = Message("Collinearity of the chosen sensors")
         return Table(
             title=title,
-            columns=("sensor", "correlation with the error", "VIF"),
+            columns=(Message("sensor"), Message("correlation with the error"), "VIF"),
             rows=rows,
             caption=caption,
         )

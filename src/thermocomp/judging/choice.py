@@ -112,7 +112,7 @@ def format_cell(cell: Cell) -> str:
     """Return a cell as text: four digits, empty for unknown values."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
+    return f"{cell:.4g}" if isinstance(cell, float) else cell if isinstance(cell, str) else str(cell)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from thermocomp.core.correction import Limits
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.inputs import Support
+from thermocomp.core.messages import Message
 from thermocomp.judging import do_no_harm
 from thermocomp.judging.diagnostics import Collinearity, collinearity
 from thermocomp.judging.guards import Guard, find_guard
@@ -223,7 +224,7 @@ def split_by_cycle(whole: Assessment) -> list[Assessment]:
             replace(
                 whole,
                 **cut,
-                block=f"cycle {unit.name}",
+                block=Message("cycle {name}", name=unit.name),
                 alone=None if whole.alone is None else whole.alone[rows],
                 half_widths=half_widths,
                 band=whole.band if half_widths is not None and np.isfinite(half_widths).any() else "",

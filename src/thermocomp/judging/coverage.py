@@ -8,13 +8,14 @@ sensor does not make two blocks different. Two blocks with a distance below `ALI
 same program on a similar day, adds no information. Alike blocks count once (single linkage).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from thermocomp.core.arrays import BoolArray, FloatArray
+from thermocomp.core.messages import Message
 from thermocomp.core.validity import Validity
 from thermocomp.judging.choice import Cell, Table
 from thermocomp.judging.splits import Judging
@@ -135,13 +136,14 @@ def _ambient(
     return (named, (float(known.min()), float(known.max()))) if known.size else ("", None)
 
 
-def table(named: dict[str, Validity]) -> Table:
+def table(named: Mapping[str, Validity]) -> Table:
     """Return the covered conditions as a short table: one column per judging scheme."""
     columns = [_cells(v) for v in named.values()]
     rows: list[tuple[Cell, ...]] = [(heading, *(c[heading] for c in columns)) for heading in columns[0]]
-    caption = (
-        f"Cycles or files count as distinct if their inputs differ by at least {ALIKE:g} of the spread of the inputs; "
-        "copies count once."
+    caption = Message(
+        "Cycles or files count as distinct if their inputs differ by at least {alike:g} of the spread of the inputs; "
+        "copies count once.",
+        alike=ALIKE,
     )
     return Table(
         title="Conditions covered by the judged cycles or files",
@@ -152,23 +154,29 @@ def table(named: dict[str, Validity]) -> Table:
 
 
 def _cells(v: Validity) -> dict[str, str]:
-    days = f", {v.days} day{'s' if v.days > 1 else ''}" if v.days else ""
+    days = Message(", {n} day" if v.days == 1 else ", {n} days", n=v.days) if v.days else ""
+    distinct = Message("{n}, {distinct} of them distinct", n=v.units, distinct=v.independent)
+    near = Message("differ by {by:.2f} of the inputs' spread", by=v.nearest) if v.nearest is not None else ""
+    ambient = Message("not specified")
+    if v.ambient:
+        ambient = Message("{values} ({sensor})", values=_range(v.ambient), sensor=v.ambient_channel)
     return {
-        "cycles or files judged": f"{v.units}, {v.independent} of them distinct" if v.units > 1 else f"{v.units}",
-        "two most similar": "" if v.nearest is None else f"differ by {v.nearest:.2f} of the inputs' spread",
-        "hours, days": f"{v.hours:.1f} h{days}",
-        "spindle speeds [1/min]": _listed(v.speeds) or "not recorded",
-        "axes": v.axes,
-        "surroundings [degC]": f"{_range(v.ambient)} ({v.ambient_channel})" if v.ambient else "not specified",
-        "mean temperature at the start [degC]": _range(v.start) if v.start else "",
+        Message("cycles or files judged"): distinct if v.units > 1 else f"{v.units}",
+        Message("two most similar"): near,
+        Message("hours, days"): Message("{hours:.1f} h{days}", hours=v.hours, days=days),
+        Message("spindle speeds [1/min]"): _listed(v.speeds) or Message("not recorded"),
+        Message("axes"): Message(v.axes),
+        Message("surroundings [degC]"): ambient,
+        Message("mean temperature at the start [degC]"): _range(v.start) if v.start else "",
     }
 
 
-def _range(values: tuple[float, float]) -> str:
-    return f"{values[0]:.1f} to {values[1]:.1f}"
+def _range(values: tuple[float, float]) -> Message:
+    return Message("{low:.1f} to {high:.1f}", low=values[0], high=values[1])
 
 
 def _listed(speeds: Sequence[float]) -> str:
     if len(speeds) > 12:
-        return f"{len(speeds)} speeds from {speeds[0]:.0f} to {speeds[-1]:.0f}"
+        low, high = speeds[0], speeds[-1]
+        return Message("{n} speeds from {low:.0f} to {high:.0f}", n=len(speeds), low=low, high=high)
     return ", ".join(f"{v:.0f}" for v in speeds)

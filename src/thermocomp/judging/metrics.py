@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from thermocomp.core.arrays import FloatArray
+from thermocomp.core.messages import Message
 
 Function = Callable[[FloatArray, FloatArray], float]
 
@@ -53,7 +54,7 @@ def metric(best: Literal["low", "high", "zero"], unit: str) -> Callable[[Functio
     def register(function: Function) -> Metric:
         name = function.__name__
         METRICS[name] = Metric(
-            name=name, best=best, unit=unit, description=(function.__doc__ or "").strip(), function=function
+            name=name, best=best, unit=unit, description=Message((function.__doc__ or "").strip()), function=function
         )
         return METRICS[name]
 

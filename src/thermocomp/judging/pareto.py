@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.messages import Message, join
 from thermocomp.judging.budget import SHARE, WORTH, Budget, budget
 from thermocomp.judging.candidates import Candidates
 from thermocomp.judging.choice import Cell, Choice, Progress, Settings, Table
@@ -34,18 +35,28 @@ def choose(samples: Samples, judging: Judging, settings: Settings, *, jobs: int,
     m, best = np.unravel_index(int(np.nanargmin(found.mean())), found.mean().shape)
     model, place = recommended or (found.models[int(m)], int(best))
     sensors, (error, none) = found.sensors[place], found.stated(model, place)
-    told = f"{model} with {len(sensors)} of {len(found.candidates)} temperatures leaves {error:.2f} {_rms(found)} on "
-    told += f"unseen cycles{_mean(found)}, instead of {none:.2f} {found.unit}"
+    told = Message(
+        "{model} with {n} of {of} temperatures leaves {error:.2f} {rms} on unseen cycles{mean}, instead of {none:.2f} "
+        "{unit}",
+        model=model,
+        n=len(sensors),
+        of=len(found.candidates),
+        error=error,
+        rms=_rms(found),
+        mean=_mean(found),
+        none=none,
+        unit=found.unit,
+    )
     tables = [
         _errors(found, judging, model, place if recommended else None),
         _by_target(found, model, place),
     ]
-    notes, failure = _notes(found, judging), ""
+    notes, failure, reason = _notes(found, judging), "", join([told, trade_off(found, model, place)], "; ")
     if recommended is None:
         sensors = ()
-        reason = failure = f"no set of temperatures is clearly better than no compensation; the smallest error: {told}"
+        none_better = "no set of temperatures is clearly better than no compensation; the smallest error: {error}"
+        reason = failure = Message(none_better, error=told)
     else:
-        reason = f"{told}; {trade_off(found, model, place)}"
         notes[1:1] = _advice(found, model, place)
         tables += [
             *([_next(found, model, place)] if len(found.sensors) > 1 else []),
@@ -69,10 +80,13 @@ def _notes(found: Budget, judging: Judging) -> list[str]:
     """Return the reason for the number of sensors, and the cases that could not be judged."""
     notes = [_rule(found)]
     if found.failures:
-        notes.append(f"Some numbers of sensors could not be judged: {_failed(found)}")
+        notes.append(Message("Some numbers of sensors could not be judged: {why}", why=_failed(found)))
     if len(found.blocks) < len(judging.splits):
-        several = "one of the targets" if len(found.targets) > 1 else "the target"
-        notes.append(f"{len(judging.splits) - len(found.blocks)} block(s) without a value of {several} were left out.")
+        n, what = (
+            len(judging.splits) - len(found.blocks),
+            "one of the targets" if len(found.targets) > 1 else "the target",
+        )
+        notes.append(Message("{n} block(s) without a value of {what} were left out.", n=n, what=Message(what)))
     return notes
 
 
@@ -80,13 +94,18 @@ def _advice(found: Budget, model: str, place: int) -> list[str]:
     """Return the advantages and drawbacks of the recommended sensors."""
     left = found.of_targets()[found.models.index(model), place]
     idle = [t for t, e, none in zip(found.targets, left, found.none_of_targets(), strict=True) if e >= none]
-    none_better = f"These sensors are no better than no compensation for {', '.join(idle)}: select for it separately."
+    none_better = Message(
+        "These sensors are no better than no compensation for {targets}: select for it separately.",
+        targets=", ".join(idle),
+    )
     return [
         *([none_better] if idle else []),
         next_to_buy(found, model, place),
-        "Each set contains the sensors from which the others can be predicted with the smallest change of the output "
-        "of `averaged`; the sets are the same for all displacements and models. The number of sensors was chosen by "
-        "the errors shown, so these are slightly optimistic.",
+        Message(
+            "Each set contains the sensors from which the others can be predicted with the smallest change of the "
+            "output of `averaged`; the sets are the same for all displacements and models. The number of sensors was "
+            "chosen by the errors shown, so these are slightly optimistic."
+        ),
     ]
 
 
@@ -96,11 +115,13 @@ def _failed(found: Budget) -> str:
 
 def _rms(found: Budget) -> str:
     """Return the name of the error over all unseen rows."""
-    return "% of the RMS without compensation" if found.unit == PERCENT else f"{found.unit} RMS"
+    if found.unit == PERCENT:
+        return Message("% of the RMS without compensation")
+    return Message("{unit} RMS", unit=found.unit)
 
 
 def _mean(found: Budget) -> str:
-    return f" (mean of {len(found.targets)} displacements)" if len(found.targets) > 1 else ""
+    return Message(" (mean of {n} displacements)", n=len(found.targets)) if len(found.targets) > 1 else ""
 
 
 def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> Table:
@@ -109,23 +130,29 @@ def _errors(found: Budget, judging: Judging, model: str, place: int | None) -> T
         (size, *(float(v) for v in mean[:, k]), gains[k], float(found.condition[k]), " ".join(found.sensors[k]))
         for k, size in enumerate(found.sizes)
     )
-    headings = [f"{m} mean RMS [{found.unit}]" for m in found.models]
+    headings = [Message("{model} mean RMS [{unit}]", model=m, unit=found.unit) for m in found.models]
+    enough = [Message("{n} for {model}", n=found.enough(m) or Message("none"), model=m) for m in found.models]
     return Table(
-        title=f"Error on unseen blocks: {judging.name}",
+        title=Message("Error on unseen blocks: {judging}", judging=judging.name),
         columns=(
-            "sensors",
+            Message("sensors"),
             *headings,
-            f"gain of the next row [{found.unit}]",
-            "condition number",
-            "selected on all rows",
+            Message("gain of the next row [{unit}]", unit=found.unit),
+            Message("condition number"),
+            Message("selected on all rows"),
         ),
         rows=rows,
         marked=place,
-        caption=f"RMS on each unseen block, mean over the blocks{_mean(found)}, to compare sets; without compensation "
-        f"{found.none_mean():.2f} {found.unit}. Gain of the next row: reduction of the error of {model} by the "
-        "additional sensors of the next row. Sufficient number of sensors: "
-        + ", ".join(f"{found.enough(m) or 'none'} for {m}" for m in found.models)
-        + ".",
+        caption=Message(
+            "RMS on each unseen block, mean over the blocks{mean}, to compare sets; without compensation {none:.2f} "
+            "{unit}. Gain of the next row: reduction of the error of {model} by the additional sensors of the next "
+            "row. Sufficient number of sensors: {enough}.",
+            mean=_mean(found),
+            none=found.none_mean(),
+            unit=found.unit,
+            model=model,
+            enough=join(enough, ", "),
+        ),
     )
 
 
@@ -137,17 +164,21 @@ def _by_target(found: Budget, model: str, place: int) -> Table:
     )
     more = (errors[place] - errors[-1]) / found.scales
     worst = int(np.argmax(more))
+    most = Message(
+        " {target} is affected most: {more:.2f} {unit} more than with all sensors.",
+        target=found.targets[worst],
+        more=float(more[worst]),
+        unit=found.unit,
+    )
     return Table(
-        title=f"Error on unseen blocks for each displacement: {model}",
-        columns=("sensors", *(f"{t} RMS" for t in found.targets)),
+        title=Message("Error on unseen blocks for each displacement: {model}", model=model),
+        columns=(Message("sensors"), *(f"{t} RMS" for t in found.targets)),
         rows=rows,
         marked=1 + place,
-        caption="Over all unseen rows, as in `compare` and `fit`, each in the unit of the displacement; 0 sensors: "
-        "without compensation."
-        + (
-            f" {found.targets[worst]} is affected most: {more[worst]:.2f} {found.unit} more than with all sensors."
-            if place + 1 < len(errors)
-            else ""
+        caption=Message(
+            "Over all unseen rows, as in `compare` and `fit`, each in the unit of the displacement; 0 sensors: without "
+            "compensation.{most}",
+            most=most if place + 1 < len(errors) else "",
         ),
     )
 
@@ -157,22 +188,31 @@ def _next(found: Budget, model: str, place: int) -> Table:
     gains, blocks = found.gains(model)
     unit = found.unit
     return Table(
-        title="Next sensor to buy",
-        columns=("sensors", "next", f"gain [{unit}]", f"in the worst block [{unit}]", f"in the best block [{unit}]"),
+        title=Message("Next sensor to buy"),
+        columns=(
+            Message("sensors"),
+            Message("next"),
+            Message("gain [{unit}]", unit=unit),
+            Message("in the worst block [{unit}]", unit=unit),
+            Message("in the best block [{unit}]", unit=unit),
+        ),
         rows=tuple(
             (found.sizes[k], _joins(found, k), float(gains[k]), float(blocks[k].min()), float(blocks[k].max()))
             for k in range(len(gains))
         ),
         marked=place if place < len(gains) else None,
-        caption=f"Gain: reduction of the error of {model}; if negative, the error is larger with the sensor than "
-        "without it. For each block, the sensors were selected with this block excluded.",
+        caption=Message(
+            "Gain: reduction of the error of {model}; if negative, the error is larger with the sensor than without "
+            "it. For each block, the sensors were selected with this block excluded.",
+            model=model,
+        ),
     )
 
 
 def _joins(found: Budget, place: int) -> str:
     """Return the name of the sensor added next; for the step from the largest set to all, the number added."""
     new = [s for s in found.sensors[place + 1] if s not in found.sensors[place]]
-    return new[0] if len(new) == 1 else f"all {len(new)} others"
+    return new[0] if len(new) == 1 else Message("all {n} others", n=len(new))
 
 
 def next_to_buy(found: Budget, model: str, place: int) -> str:
@@ -181,41 +221,55 @@ def next_to_buy(found: Budget, model: str, place: int) -> str:
     assert margins is not None
     margin, _, least = margins
     if place == len(found.sensors) - 1:
-        return "Next to buy: all temperatures are in use; the gain of others is unknown."
+        return Message("Next to buy: all temperatures are in use; the gain of others is unknown.")
     gains, blocks = found.gains(model)
     own, unit = blocks[place], found.unit
-    spread = f" ({own.min():.2f} to {own.max():.2f} {unit} from block to block)" if len(own) > 1 else ""
-    would = f"{_joins(found, place)} would gain {gains[place]:.2f} {unit}{spread}"
-    none = f"{would}; a further sensor must gain at least {least:.2f} {unit}."
+    spread = Message(
+        " ({low:.2f} to {high:.2f} {unit} from block to block)", low=float(own.min()), high=float(own.max()), unit=unit
+    )
+    would = Message(
+        "{sensor} would gain {gain:.2f} {unit}{spread}",
+        sensor=_joins(found, place),
+        gain=float(gains[place]),
+        unit=unit,
+        spread=spread if len(own) > 1 else "",
+    )
+    none = Message(
+        "{would}; a further sensor must gain at least {least:.2f} {unit}.", would=would, least=least, unit=unit
+    )
     # if a single sensor gains too little, several may gain enough
     for k, gain in enumerate(np.cumsum(gains[place:]).tolist(), start=place + 1):
         new = [s for s in found.sensors[k] if s not in found.sensors[place]]
         if gain > len(new) * least:
-            surely = (
-                "."
-                if gain > margin
-                else ", less than the differences between the blocks: more thermal cycles would decide."
-            )
+            unsure = Message(", less than the differences between the blocks: more thermal cycles would decide.")
+            surely = "." if gain > margin else unsure
             if k == place + 1:
-                return f"Next to buy: {would}{surely}"
-            both = " and ".join(new) if len(new) == 2 else f"{len(new)} ({', '.join(new)})"
-            return (
-                f"Next to buy: no single one is worth it. {none} {both} together would gain {gain:.2f} {unit}{surely}"
+                return Message("Next to buy: {would}{surely}", would=would, surely=surely)
+            both = join(new, Message(" and ")) if len(new) == 2 else f"{len(new)} ({', '.join(new)})"
+            return Message(
+                "Next to buy: no single one is worth it. {none} {both} together would gain {gain:.2f} {unit}{surely}",
+                none=none,
+                both=both,
+                gain=gain,
+                unit=unit,
+                surely=surely,
             )
-    return f"Next to buy: none is worth it. {none}"
+    return Message("Next to buy: none is worth it. {none}", none=none)
 
 
 def _frequency(found: Budget, place: int) -> Table:
     order = np.argsort(-found.frequency[place], kind="stable")
     return Table(
-        title=f"Selection frequency: sensor among the best {len(found.sensors[place])}",
-        columns=("sensor", "share of the blocks [%]"),
+        title=Message("Selection frequency: sensor among the best {n}", n=len(found.sensors[place])),
+        columns=(Message("sensor"), Message("share of the blocks [%]")),
         rows=tuple(
             (found.candidates[j], float(100 * found.frequency[place, j]))
             for j in order
             if found.frequency[place, j] > 0
         ),
-        caption="Selection repeated with each block excluded in turn: a sensor far below 100 % was selected by chance.",
+        caption=Message(
+            "Selection repeated with each block excluded in turn: a sensor far below 100 % was selected by chance."
+        ),
     )
 
 
@@ -228,7 +282,8 @@ def _stand_ins(found: Budget, place: int) -> Table:
     def parts(j: int) -> str:
         shares = np.abs(made.weights[:, j]) * own
         named = [k for k in np.argsort(-shares, kind="stable").tolist() if shares[k] > PART * own[j]]
-        return ", ".join(f"{made.weights[k, j]:.2f} {names[k]}" for k in named) or "none"
+        told = [Message("{weight:.2f} {name}", weight=float(made.weights[k, j]), name=names[k]) for k in named]
+        return join(told or [Message("none")], ", ")
 
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
@@ -242,21 +297,26 @@ def _stand_ins(found: Budget, place: int) -> Table:
         for j, name in enumerate(names)
     )
     return Table(
-        title="Virtual sensors",
+        title=Message("Virtual sensors"),
         columns=(
-            "sensor",
-            "best other sensor",
-            "error with it [degC]",
-            "from the selected sensors",
-            "error with them [degC]",
-            f"loss [{found.unit}]",
+            Message("sensor"),
+            Message("best other sensor"),
+            Message("error with it [degC]"),
+            Message("from the selected sensors"),
+            Message("error with them [degC]"),
+            Message("loss [{unit}]", unit=found.unit),
         ),
         rows=rows,
-        caption="Each temperature is predicted from the single other one that predicts it best, and from the selected "
-        "sensors (a selected one from the other selected ones, as if it had failed), with sensor noise of "
-        f"{found.answer.noise:g} degC in use. Error: RMS of the prediction error. Loss: change of the output of "
-        f"`averaged` with all temperatures if only this one is predicted from the selected sensors{_mean(found)}. "
-        f"Sensors with a share below {100 * PART:g} % are not named.",
+        caption=Message(
+            "Each temperature is predicted from the single other one that predicts it best, and from the selected "
+            "sensors (a selected one from the other selected ones, as if it had failed), with sensor noise of "
+            "{noise:g} degC in use. Error: RMS of the prediction error. Loss: change of the output of `averaged` with "
+            "all temperatures if only this one is predicted from the selected sensors{mean}. Sensors with a share "
+            "below {part:g} % are not named.",
+            noise=float(found.answer.noise),
+            mean=_mean(found),
+            part=100 * PART,
+        ),
     )
 
 
@@ -268,7 +328,11 @@ def _repeats(candidates: Sequence[Candidates], sensors: Sequence[str]) -> Table:
     rows = zip(*(t.rows for t in tables), strict=True)
     return replace(
         tables[0],
-        columns=("sensor", *(f"correlation with {c.target}" for c in candidates), "VIF"),
+        columns=(
+            Message("sensor"),
+            *(Message("correlation with {target}", target=c.target) for c in candidates),
+            "VIF",
+        ),
         rows=tuple((row[0][0], *(cells[1] for cells in row), row[0][2]) for row in rows),
     )
 
@@ -278,22 +342,37 @@ def trade_off(found: Budget, model: str, place: int) -> str:
     mean = found.mean()
     m, n = found.models.index(model), found.sizes[place]
     best = np.unravel_index(int(np.nanargmin(mean)), mean.shape)
-    others = {(int(best[0]), int(best[1])): ", the best of the table"}
+    others: dict[tuple[int, int], str] = {(int(best[0]), int(best[1])): Message(", the best of the table")}
     others.setdefault((m, len(found.sizes) - 1), "")
     said = []
     for (k, j), what in others.items():
         cost = float(mean[m, place] - mean[k, j])
         if (k, j) != (m, place):
-            by = f" by {found.models[k]}" if k != m else ""
-            other = f"{found.sizes[j]}{by}" if j != place else f"as many{by}"
-            said.append(f"{abs(cost):.2g} {found.unit} {'more' if cost >= 0 else 'less'} than {other}{what}")
+            said.append(
+                Message(
+                    "{cost:.2g} {unit} more than {other}{by}{what}"
+                    if cost >= 0
+                    else "{cost:.2g} {unit} less than {other}{by}{what}",
+                    cost=abs(cost),
+                    unit=found.unit,
+                    other=found.sizes[j] if j != place else Message("as many"),
+                    by=Message(" by {model}", model=found.models[k]) if k != m else "",
+                    what=what,
+                )
+            )
     if not said:
-        return (
+        fewer = n > 1
+        return Message(
             "with fewer sensors the error exceeds the margin of the rule"
-            if n > 1
+            if fewer
             else "there is no other set to choose from"
         )
-    return f"{n} sensor{'s' if n > 1 else ''} cost{'s' if n == 1 else ''} {' and '.join(said)} (means over the blocks)"
+    costs = (
+        "{n} sensors cost {what} (means over the blocks)"
+        if n > 1
+        else "{n} sensor costs {what} (means over the blocks)"
+    )
+    return Message(costs, n=n, what=join(said, Message(" and ")))
 
 
 def _rule(found: Budget) -> str:
@@ -301,12 +380,16 @@ def _rule(found: Budget) -> str:
     margins = found.margin()
     assert margins is not None
     margin, error, least = margins
-    what = "the minimum gain of a further sensor"
+    what = Message("the minimum gain of a further sensor")
     if found.unit == PERCENT or least < WORTH:
-        what = f"{100 * SHARE:g} % of the error without compensation, {what}"
-    unit = found.unit
-    return (
+        what = Message("{share:g} % of the error without compensation, {what}", share=100 * SHARE, what=what)
+    return Message(
         "Rule: the fewest sensors that are better than no compensation and whose mean RMS over the unseen blocks "
-        f"(see the table) is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
-        f"blocks (Breiman 1984), {error:.2f} {unit}, and of {least:.2f} {unit}, {what}."
+        "(see the table) is within {margin:.2f} {unit} of the smallest: the larger of one standard error between the "
+        "blocks (Breiman 1984), {error:.2f} {unit}, and of {least:.2f} {unit}, {what}.",
+        margin=margin,
+        unit=found.unit,
+        error=error,
+        least=least,
+        what=what,
     )

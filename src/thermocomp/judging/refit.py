@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from thermocomp.core.inputs import Support
+from thermocomp.core.messages import Message
 from thermocomp.core.model import ErrorModel
 from thermocomp.judging.guards import Guard, find_guard
 from thermocomp.judging.pieces import work_through
@@ -57,7 +58,9 @@ def _refit(samples: Samples, support: Support, guard: Guard | None, judged: Asse
 
 
 def _not_refitted(judged: Assessment, why: str) -> Assessment:
-    return replace(judged, verdict=replace(judged.verdict, caps=(f"cannot be fitted to all rows: {why}",)))
+    return replace(
+        judged, verdict=replace(judged.verdict, caps=(Message("cannot be fitted to all rows: {why}", why=why),))
+    )
 
 
 def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
@@ -67,4 +70,4 @@ def fit_whole(method: str, samples: Samples, target: int) -> ErrorModel:
 
 def describe_method(name: str) -> str:
     """Return a sentence that describes a method."""
-    return METHODS[name].summary if name in METHODS else "an estimator supplied by the user"
+    return Message(METHODS[name].summary if name in METHODS else "an estimator supplied by the user")

@@ -64,7 +64,7 @@ def by_rows(samples: Samples, train: float, test: float) -> Judging:
     n = len(own)
     ends = [*own.tolist(), len(samples)]
     first, stop = ends[round(n * train)], ends[min(n, round(n * (train + test)))]
-    name = f"first {train:.0%} of the rows for training, next {test:.0%} unseen"
+    name = Message("first {train:.0%} of the rows for training, next {test:.0%} unseen", train=train, test=test)
     return _consecutive(name, len(samples), first, stop)
 
 
@@ -88,7 +88,7 @@ def by_time(samples: Samples, train_s: float, test_s: float) -> Judging:
             f"split {train_s / 3600:g} h/{test_s / 3600:g} h: the recordings last only {elapsed[-1] / 3600:.2f} h in "
             "all"
         )
-    name = f"first {train_s / 3600:g} h for training, next {test_s / 3600:g} h unseen"
+    name = Message("first {train:g} h for training, next {test:g} h unseen", train=train_s / 3600, test=test_s / 3600)
     return _consecutive(name, len(samples), first, stop)
 
 
@@ -118,7 +118,7 @@ def join_short_cycles(cycle: IntArray, test: IntArray, least: int = MIN_ROWS) ->
 def name_cycles(samples: Samples, block: IntArray) -> str:
     """Return the name of a cycle, or of several consecutive cycles."""
     first, last = (samples.cycle_names[c] for c in (block[0], block[-1]))
-    return first if len(block) == 1 else f"{first} to {last}"
+    return first if len(block) == 1 else Message("{first} to {last}", first=first, last=last)
 
 
 def leave_one_cycle_out(samples: Samples) -> Judging:
@@ -136,7 +136,7 @@ def leave_one_cycle_out(samples: Samples) -> Judging:
     splits = []
     for block in blocks:
         mine = np.isin(samples.cycle, block)
-        splits.append(Split(f"cycle {name_cycles(samples, block)}", ~mine, mine))
+        splits.append(Split(Message("cycle {name}", name=name_cycles(samples, block)), ~mine, mine))
     if joined:
         name = Message(
             "leave one thermal cycle out ({n} cycles, {joined} of them too short: left out with the previous one)",
@@ -154,7 +154,8 @@ def leave_one_file_out(samples: Samples) -> Judging:
     if n < 2:
         raise InputError("leaving one file out needs at least two recordings, found one")
     splits = [
-        Split(f"file {samples.test_names[k]}", samples.test != k, samples.test == k, whole=True) for k in range(n)
+        Split(Message("file {name}", name=name), samples.test != k, samples.test == k, whole=True)
+        for k, name in enumerate(samples.test_names)
     ]
     return Judging(Message("leave one file out ({n} files)", n=n), tuple(splits))
 
@@ -185,8 +186,8 @@ def leave_one_day_out(samples: Samples) -> Judging:
     splits = []
     for block in blocks:
         mine = np.isin(day, block) & own
-        more = f" and {len(block) - 1} more" if len(block) > 1 else ""
-        splits.append(Split(f"day {names[block[0]]}{more}", ~mine, mine, whole=True))
+        more = Message(" and {n} more", n=len(block) - 1) if len(block) > 1 else ""
+        splits.append(Split(Message("day {day}{more}", day=str(names[block[0]]), more=more), ~mine, mine, whole=True))
     return Judging(Message("leave one day out ({n} days)", n=len(blocks)), tuple(splits))
 
 
@@ -209,5 +210,13 @@ def _consecutive(name: str, n: int, first: int, stop: int) -> Judging:
     if first < 1 or stop <= first:
         raise InputError(f"{name}: no row is left for training, or none for validation ({n} rows in all)")
     return Judging(
-        name, (Split(f"rows {first}-{stop - 1}", rows < first, (rows >= first) & (rows < stop), stretch=True),)
+        name,
+        (
+            Split(
+                Message("rows {first}-{last}", first=first, last=stop - 1),
+                rows < first,
+                (rows >= first) & (rows < stop),
+                stretch=True,
+            ),
+        ),
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray, IntArray
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message, join
 from thermocomp.recordings.rows import Instant, Rows
 
 #: maximum number of locations listed
@@ -87,11 +88,19 @@ class Cut(Step):
                     f"{rows.source}: {self.name}: this would remove all {len(hit)} rows; shorten the times"
                 )
             kept = rows.kept(np.flatnonzero(~hit))
-            return kept.noted(f"cut: {len(at)} of {len(hit)} rows{self._why()}: {listed}")
+            told = Message("cut: {n} of {of} rows{why}: {rows}", n=len(at), of=len(hit), why=self._why(), rows=listed)
+            return kept.noted(told)
         table = rows.table.copy()
         names = rows.columns(self.channels, self.name)
         table.loc[hit, names] = np.nan
-        note = f"cut: {len(at)} of {len(hit)} values of {', '.join(names)}{self._why()}: {listed}"
+        note = Message(
+            "cut: {n} of {of} values of {names}{why}: {rows}",
+            n=len(at),
+            of=len(hit),
+            names=", ".join(names),
+            why=self._why(),
+            rows=listed,
+        )
         return replace(rows, table=table).noted(note)
 
     def _rows(self, t: Instant | tuple[Instant, Instant], rows: Rows) -> BoolArray:
@@ -142,10 +151,15 @@ class Shift(Step):
             x = table[name].to_numpy(dtype=np.float64)
             y = x[before] if name in steps else np.where(exact, x[before], x[before] + share * (x[after] - x[before]))
             table[name] = np.where(inside, y, np.nan)
-        way = "later" if self.by_s > 0 else "earlier"
-        lost = int(np.count_nonzero(~inside))
-        note = f"shift: {', '.join(self.channels)} {abs(self.by_s):.10g} s {way}{self._why()}"
-        return replace(rows, table=table).noted(f"{note}; {lost} rows at the end of the test are left without a value")
+        note = Message(
+            "shift: {names} {by:.10g} s {way}{why}; {lost} rows at the end of the test are left without a value",
+            names=", ".join(self.channels),
+            by=float(abs(self.by_s)),
+            way=Message("later" if self.by_s > 0 else "earlier"),
+            why=self._why(),
+            lost=int(np.count_nonzero(~inside)),
+        )
+        return replace(rows, table=table).noted(note)
 
 
 @dataclass(frozen=True)
@@ -193,8 +207,16 @@ class Rezero(Step):
                 )
             height = _step(x, first, name, f"{rows.source}: {self.name}") if self.to is None else x[there[0]] - self.to
             table[name] = np.where(moved, x - height, x)
-            told = f"{len(there)} values from {rows.place(first)} on by {-height:+.6g}"
-            notes.append(f"rezero: {name}: {told}{self._why()}")
+            notes.append(
+                Message(
+                    "rezero: {name}: {n} values from {row} on by {by:+.6g}{why}",
+                    name=name,
+                    n=len(there),
+                    row=rows.place(first),
+                    by=float(-height),
+                    why=self._why(),
+                )
+            )
         return replace(rows, table=table).noted(*notes)
 
 
@@ -228,7 +250,14 @@ class Swap(Step):
         moved = rows.time >= begin - _SAME
         x, y = rows.table[a], rows.table[b]
         table = rows.table.assign(**{a: np.where(moved, y, x), b: np.where(moved, x, y)})
-        note = f"swap: {a} and {b}, {int(moved.sum())} rows from {begin:.10g} s on{self._why()}"
+        note = Message(
+            "swap: {a} and {b}, {n} rows from {begin:.10g} s on{why}",
+            a=a,
+            b=b,
+            n=int(moved.sum()),
+            begin=float(begin),
+            why=self._why(),
+        )
         return replace(rows, table=table).noted(note)
 
 
@@ -257,7 +286,13 @@ class Resample(Step):
         mean = rows.table.groupby(number, sort=True).mean().reset_index(drop=True)
         kept = rows.kept(last)
         time = rows.time[0] + number[last] * self.every_s
-        note = f"resample: {len(rows.time)} rows to {len(last)}, averages over {self.every_s:.10g} s{self._why()}"
+        note = Message(
+            "resample: {n} rows to {left}, averages over {every:.10g} s{why}",
+            n=len(rows.time),
+            left=len(last),
+            every=float(self.every_s),
+            why=self._why(),
+        )
         return replace(kept, time=time, table=mean).noted(note)
 
 
@@ -290,5 +325,11 @@ def _listed(places: Sequence[str], at: IntArray) -> str:
         return ""
     breaks = np.flatnonzero(np.diff(at) > 1) + 1
     parts = np.split(np.arange(len(at)), breaks)
-    words = [places[p[0]] if len(p) == 1 else f"{places[p[0]]} to {places[p[-1]].rpartition(' ')[2]}" for p in parts]
-    return ", ".join(words[:MOST_LISTED]) + " ..." * (len(words) > MOST_LISTED)
+    words = [
+        places[p[0]]
+        if len(p) == 1
+        else Message("{first} to {last}", first=places[p[0]], last=places[p[-1]].rpartition(" ")[2])
+        for p in parts
+    ]
+    told = join(words[:MOST_LISTED], ", ")
+    return Message("{places} ...", places=told) if len(words) > MOST_LISTED else told

@@ -11,6 +11,7 @@ from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError
 from thermocomp.core.instants import seconds
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_by_labels
 from thermocomp.recordings.headings import Meaning, understand
@@ -42,7 +43,12 @@ def parts_of(
             continue
         meaning = _meaning(column, units)
         if meaning is None or meaning.unit.quantity == "time":
-            notes.append(f"left out: {column!r} has no unit of a channel; give it by units={{{column!r}: 'degC'}}")
+            notes.append(
+                Message(
+                    "left out: {column!r} has no unit of a channel; give it by units={{{column!r}: 'degC'}}",
+                    column=column,
+                )
+            )
             continue
         values = _numbers(plain[column], f"{name}: column {column!r}")
         data[meaning.name] = values * meaning.unit.scale + meaning.unit.shift

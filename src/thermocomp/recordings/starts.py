@@ -12,16 +12,17 @@ import numpy as np
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message, join
 from thermocomp.core.zero import Zeroing, first_rows, mean_over_time
 from thermocomp.recordings.recording import Recording
 
 Word = Literal["cold", "continued", "rezeroed", "known"]
 #: description of each initial state, for tables and errors
 WORDS: dict[Word, str] = {
-    "cold": "zeroed at its start, at rest",
-    "continued": "continues from an earlier file, and uses the zero of that file",
-    "rezeroed": "displacements and temperatures are relative to its start, on a machine that may be warm",
-    "known": "uses a known zero",
+    "cold": Message("zeroed at its start, at rest"),
+    "continued": Message("continues from an earlier file, and uses the zero of that file"),
+    "rezeroed": Message("displacements and temperatures are relative to its start, on a machine that may be warm"),
+    "known": Message("uses a known zero"),
 }
 #: a displacement whose initial value is smaller than this was zeroed there [um or urad]
 NEAR = 3.0
@@ -67,7 +68,7 @@ class Start:
     """
 
     word: Word = "cold"
-    why: str = "stated"
+    why: str = Message("stated")
     earlier: tuple[Recording, ...] = ()
     gap: float | None = None
     zero: Mapping[str, float] = field(default_factory=dict)
@@ -101,9 +102,17 @@ class Start:
     def told(self, name: str) -> str:
         """Return the state as text, such as ``b: continued from a (continues from an earlier file ...); stated``."""
         names = ", ".join(r.name for r in self.earlier)
-        before = f" from {names}" if self.word == "continued" else ""
-        after = f"; what went before: {names}" if self.earlier and not before else ""
-        return f"{name}: {self.word}{before} ({WORDS[self.word]}{after}); {self.why}"
+        before = Message(" from {names}", names=names) if self.word == "continued" else ""
+        after = Message("; what went before: {names}", names=names) if self.earlier and not before else ""
+        return Message(
+            "{name}: {word}{before} ({what}{after}); {why}",
+            name=name,
+            word=Message(self.word),
+            before=before,
+            what=WORDS[self.word],
+            after=after,
+            why=self.why,
+        )
 
 
 #: zeroed at rest at its start, whatever the initial displacement
@@ -122,19 +131,28 @@ def bridge_files(start: Start, recording: Recording) -> tuple[Start, FloatArray]
     for before, after in pairwise(every):
         stamped = _between(before, after)
         if start.gap is not None:
-            gap, how = start.gap, "stated"
+            gap, how = start.gap, Message("stated")
         elif stamped is not None:
-            gap, how = stamped, "by their time stamps"
+            gap, how = stamped, Message("by their time stamps")
         else:
-            gap, how = before.sampling_interval, "assumed to be one sampling interval: no time stamps, no stated gap"
+            gap = before.sampling_interval
+            how = Message("assumed to be one sampling interval: no time stamps, no stated gap")
         if not gap > 0:
             raise InputError(
                 f"{after.name} cannot continue {before.name}: by their time stamps it begins {-gap:g} s before the end "
                 f"of {before.name}"
             )
         begins.append(begins[-1] + float(before.time[-1]) + gap)
-        words.append(f"{after.name} begins {gap:g} s after the end of {before.name} ({how})")
-    why = "; ".join([start.why, *words])
+        words.append(
+            Message(
+                "{after} begins {gap:g} s after the end of {before} ({how})",
+                after=after.name,
+                gap=gap,
+                before=before.name,
+                how=how,
+            )
+        )
+    why = join([start.why, *words], "; ")
     return replace(start, why=why), np.array(begins)
 
 
@@ -151,7 +169,7 @@ def find_starts(
     file (by time stamps), the test continues that file. Other cases are undetermined.
     """
     if absolute:
-        return tuple(Start("known", "temperatures are absolute") for _ in recordings)
+        return tuple(Start("known", Message("temperatures are absolute")) for _ in recordings)
     found = {id(r): _found(r, [o for o in recordings if o is not r], targets, zeroing) for r in recordings}
 
     def whole(start: Start) -> Start:
@@ -214,14 +232,15 @@ def _found(recording: Recording, others: Sequence[Recording], targets: Sequence[
         if before is not None and any(
             abs(level(before, c.name, zeroing, end=True)) > _tolerance(before, c.name) for c in targets
         ):
-            return Start("rezeroed", f"it follows {before.name} by its time stamps, and begins near zero again")
-        turning = ", although the spindle turns in the first row" * turns(recording, zeroing)
-        return Start("cold", f"assumed, since the displacements begin near zero{turning}")
+            again = Message("it follows {before} by its time stamps, and begins near zero again", before=before.name)
+            return Start("rezeroed", again)
+        turning = [Message(", although the spindle turns in the first row")] * turns(recording, zeroing)
+        return Start("cold", join([Message("assumed, since the displacements begin near zero"), *turning]))
     if before is not None and all(
         abs(level(before, n, zeroing, end=True) - levels[n]) <= max(_tolerance(recording, n), _tolerance(before, n))
         for n in far
     ):
-        return Start("continued", "by time stamps and displacements", (before,))
+        return Start("continued", Message("by time stamps and displacements"), (before,))
     name = max(far, key=lambda n: abs(levels[n]))
     raise InputError(
         f"{recording.source or recording.name}: {name} begins at {levels[name]:.1f} {far[name].unit}, so it was not "

@@ -7,6 +7,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from thermocomp.core.messages import Message, join
+from thermocomp.core.validity import Validity
 from thermocomp.judging import coverage
 from thermocomp.judging.assessing import Judged
 from thermocomp.judging.diagnostics import Collinearity
@@ -16,6 +18,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.report import faults, probings
 from thermocomp.report.declared import measured
 from thermocomp.report.html import draw_measured, draw_runs, page
+from thermocomp.report.language import write_number
 from thermocomp.report.layout import laid_out
 from thermocomp.report.sections import Section
 from thermocomp.report.summary import summarise
@@ -33,7 +36,7 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
         **content
         | {
             "headers": [*content["headers"], *_fitted_with(judged)],
-            "verdict": "; ".join(_verdict(a, judged.stated) for a in overall) + ".",
+            "verdict": join([join([_verdict(a, judged.stated) for a in overall], "; "), "."]),
             "good": all(a.accepted for a in overall),
             "predictions": draw_runs(seen, recordings),
             "cautions": [*_fitted_badly(judged), *content["cautions"], *(c for s in sections for c in s.cautions)],
@@ -45,29 +48,43 @@ def render(judged: Judged, recordings: Sequence[Recording]) -> str:
 
 def _verdict(a: Assessment, stated: Mapping[str, float]) -> str:
     if a.failure:
-        return f"{a.target}: {a.reason}"
-    known = f" ({stated[a.target]:.2f} um stated in the model file)" if a.target in stated else ""
-    return f"{a.target}: {a.word}, {measured(a, 'rms')} um RMS{known} instead of {measured(a, 'rms', none=True)} um"
+        return Message("{target}: {what}", target=a.target, what=a.reason)
+    known = Message(" ({rms:.2f} um stated in the model file)", rms=stated.get(a.target, math.nan))
+    return Message(
+        "{target}: {word}, {rms} um RMS{known} instead of {none} um",
+        target=a.target,
+        word=Message(a.word),
+        rms=write_number(measured(a, "rms")),
+        known=known if a.target in stated else "",
+        none=write_number(measured(a, "rms", none=True)),
+    )
 
 
 def _fitted_badly(judged: Judged) -> Iterator[str]:
     """Yield shortcomings found when the models were fitted."""
     for m in judged.models:
         if m.honest_error is None:
-            yield f"{m.target}: never judged on unseen cycles when it was fitted; the model does not run."
+            yield Message(
+                "{target}: never judged on unseen cycles when it was fitted; the model does not run.", target=m.target
+            )
         elif not m.accepted:
-            yield f"{m.target}: {m.honest_error.word} when it was fitted: {m.honest_error.why}."
+            yield Message(
+                "{target}: {word} when it was fitted: {why}.",
+                target=m.target,
+                word=Message(m.honest_error.word),
+                why=m.honest_error.why,
+            )
 
 
 def _fitted_with(judged: Judged) -> list[str]:
     """Return the header data of the recordings to which the models were fitted, as lines of text."""
     told = dict.fromkeys(text for m in judged.models if m.provenance for text in m.provenance.headers)
-    return [f"Models fitted to: {text}" for text in told]
+    return [Message("Models fitted to: {text}", text=text) for text in told]
 
 
 def _covered(judged: Judged, _: Sequence[Recording]) -> Section | None:
-    fitted = {"when fitted": judged.models[0].validity, "these recordings": judged.validity}
-    known = {name: v for name, v in fitted.items() if v is not None}
+    fitted = {Message("when fitted"): judged.models[0].validity, Message("these recordings"): judged.validity}
+    known: dict[str, Validity] = {name: v for name, v in fitted.items() if v is not None}
     if not known:
         return None
     table = coverage.table(known)

@@ -85,7 +85,11 @@ def panels(recording: Recording, findings: Sequence[Finding], points: int) -> li
                 rows = np.array([first]) if f.rows is None or not f.rows.size else f.rows[:: 1 + len(f.rows) // points]
                 at = np.nan_to_num(np.clip(values[rows], *limits), nan=limits[0])
                 dot = curves.PageCurve(
-                    name=f"{number} {f.kind}", hours=hours[rows], values=at, tone=_TONE[f.severity], shape="dots"
+                    name=f"{number} {translate(f.kind)}",
+                    hours=hours[rows],
+                    values=at,
+                    tone=_TONE[f.severity],
+                    shape="dots",
                 )
                 dots.append(dot)
         made.append(curves.channels(recording, shown, points, dots, limits))
@@ -109,7 +113,8 @@ def _panel(
     ordered = sorted(channels, key=lambda c: c.name not in numbers)
     names: list[str | None] = [c.name for c in ordered]
     if len(names) > _NAMED:
-        names[_NAMED - 1 :] = [f"and {len(names) - _NAMED + 1} more", *[None] * (len(names) - _NAMED)]
+        more = translate(Message("and {n} more", n=len(names) - _NAMED + 1))
+        names[_NAMED - 1 :] = [more, *[None] * (len(names) - _NAMED)]
     labels: dict[float, list[tuple[int, Finding]]] = {}
     for k, c in enumerate(ordered):
         values = np.clip(recording.table[c.name].to_numpy(dtype=np.float64), -1e30, 1e30)
@@ -124,7 +129,7 @@ def _panel(
             labels.setdefault(float(hours[row]), []).append((number, f))
     for hour, mine in labels.items():
         _label(ax, hour, mine)
-    ax.set_ylabel(channels[0].unit)
+    ax.set_ylabel(translate(channels[0].unit))
     ax.set_title(translate(quantity.replace("_", " ")))
     add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
 

@@ -7,11 +7,13 @@ from matplotlib.figure import Figure
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.contributions import contributions, gains
+from thermocomp.core.messages import Message, join
 from thermocomp.core.paceddynamic import PacedDynamic
 from thermocomp.core.shown import shorten
 from thermocomp.recordings.samples import Samples, usual_step
 from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, svg
 from thermocomp.report.figures import COLOURS, LONGEST, MEASURED, NONE, thin_points
+from thermocomp.report.language import translate
 from thermocomp.report.layout import Column, Layout
 
 #: maximum number of inputs drawn separately; the others are summed
@@ -49,26 +51,31 @@ def _draw(model: PacedDynamic, samples: Samples) -> Drawn:
         ax = figure.subplots()
         ax.axhline(0, color="#aaa", lw=0.8)
         whole = sum(parts.values(), np.full(len(samples), model.intercept))
-        ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label="prediction: sum of all")
+        ax.plot(*thin_points(hours, whole), color=MEASURED, lw=2.0, label=translate("prediction: sum of all"))
         for name, colour in zip(ranked[:MOST], COLOURS, strict=False):
             ax.plot(*thin_points(hours, parts[name]), color=colour, label=name)
         if rest := ranked[MOST:]:
             others = sum((parts[name] for name in rest), np.zeros(len(samples)))
-            ax.plot(*thin_points(hours, others), color=NONE, ls="--", label=f"sum of {len(rest)} more")
-        ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{model.unit}]")
-        ax.set_xlabel("time [h]")
+            ax.plot(
+                *thin_points(hours, others),
+                color=NONE,
+                ls="--",
+                label=translate(Message("sum of {n} more", n=len(rest))),
+            )
+        ax.set_ylabel(f"{shorten(model.target.removesuffix('_um'), LONGEST)} [{translate(model.unit)}]")
+        ax.set_xlabel(translate("time [h]"))
         ax.margins(x=0)
         add_legend(ax, **BESIDE, fontsize=7, handlelength=1.4)
         return svg(figure)
 
 
 def _table(model: PacedDynamic, step: float) -> Layout:
-    per = {"temperature": f"{model.unit}/degC"}
-    top = f"{model.unit} at {model.top_speed:.0f} 1/min"
+    per = {"temperature": Message("{unit}/degC", unit=model.unit)}
+    top = Message("{unit} at {speed:.0f} 1/min", unit=model.unit, speed=model.top_speed)
     rows: list[dict[str, Any]] = [g._asdict() | {"per": per.get(g.quantity, top)} for g in gains(model, step)]
     columns = (
         Column("input", "name"),
-        Column(f"within {step:g} s", "instantaneous", "um"),
+        Column(Message("within {step:g} s", step=step), "instantaneous", "um", named=True),
         Column("steady state", "settled", "um"),
         Column("unit", "per"),
         Column("largest contribution", "bound", "um", model.unit),
@@ -77,12 +84,17 @@ def _table(model: PacedDynamic, step: float) -> Layout:
 
 
 def _lags(model: PacedDynamic) -> str:
-    lags = ", ".join(f"{tau / 60:g}" for tau in model.time_constants)
-    found = [f"Time constants of the temperature lags: {lags} min."] if lags else []
+    lags = [Message("{tau:g}", tau=tau / 60) for tau in model.time_constants]
+    found = [Message("Time constants of the temperature lags: {lags} min.", lags=join(lags, ", "))] if lags else []
     if model.states:
         ends = [sorted({getattr(s, key) / 60 for s in model.states}) for key in ("stopped", "running")]
-        rest, run = (f"{e[0]:g} to {e[-1]:g}" for e in ends)
+        rest, run = (Message("{low:g} to {high:g}", low=e[0], high=e[-1]) for e in ends)
         found.append(
-            f"Time constants of the spindle speed states: {rest} min at rest, {run} min at {model.top_speed:.0f} 1/min."
+            Message(
+                "Time constants of the spindle speed states: {rest} min at rest, {run} min at {speed:.0f} 1/min.",
+                rest=rest,
+                run=run,
+                speed=model.top_speed,
+            )
         )
-    return " ".join(found)
+    return join(found or [""], " ")

@@ -10,7 +10,7 @@ from thermocomp.core.machine import Channel
 from thermocomp.core.shown import shorten
 from thermocomp.judging.results import Assessment
 from thermocomp.recordings.recording import Recording
-from thermocomp.report.figures import COLOURS, POINTS, clock, thin_points
+from thermocomp.report.figures import COLOURS, POINTS, clock, instead, thin_points
 from thermocomp.report.language import translate
 
 #: maximum number of points in all recordings of a page, and in each curve of a run: pages stay below 2.5 MB
@@ -69,7 +69,7 @@ def channels(
         tone, dash = f"--c{k % len(COLOURS)}", k // len(COLOURS)
         curves.append(PageCurve(name=c.name, hours=x, values=y, tone=tone, dash=dash, shape=shape))
     cycles = [(float(hours[c.start]), float(hours[c.stop - 1]), c.name, "") for c in recording.cycles]
-    title = f"{translate(quantity.replace('_', ' '))} [{shown[0].unit}]"
+    title = f"{translate(quantity.replace('_', ' '))} [{translate(shown[0].unit)}]"
     return _panel(title, [*curves, *more], cycles, limits, _LOW.get(quantity, 260))
 
 
@@ -83,14 +83,14 @@ def run(shown: Assessment, recordings: Sequence[Recording], points: int = RUN) -
     """Return the panel of a model over its judged rows: measured, predicted, residual; thermal cycles shaded."""
     hours = clock(shown, [r.time for r in recordings])
     curves = [
-        ("measured = without compensation", shown.measured, "--ink"),
-        ("predicted", shown.predicted, "--c0"),
-        ("residual = with compensation", shown.measured - shown.predicted, "--c1"),
+        (translate("measured = without compensation"), shown.measured, "--ink"),
+        (translate("predicted"), shown.predicted, "--c0"),
+        (translate("residual = with compensation"), shown.measured - shown.predicted, "--c1"),
     ]
     if shown.band and shown.half_widths is not None:
         alone = shown.predicted if shown.alone is None else shown.alone
-        edges = (("lower", -1), ("upper", 1))
-        curves += [(f"band, {edge}", alone + sign * shown.half_widths, "--c5") for edge, sign in edges]
+        edges = ((translate("band, lower"), -1), (translate("band, upper"), 1))
+        curves += [(edge, alone + sign * shown.half_widths, "--c5") for edge, sign in edges]
     names = [c.name for r in recordings for c in r.cycles]
     units = {u.name: u for u in shown.verdict.units}
     cycles = []
@@ -98,13 +98,14 @@ def run(shown: Assessment, recordings: Sequence[Recording], points: int = RUN) -
     for first, last in zip(begins, [*begins[1:] - 1, len(hours) - 1], strict=True):
         name = names[shown.cycle[first]] if shown.cycle[first] >= 0 else ""
         u = units.get(name)
-        told = f"RMS {u.rms:.2f} instead of {u.none_rms:.2f} um{', HARMFUL' if u.harmful else ''}" if u else ""
+        harm = f", {translate('HARMFUL')}" if u and u.harmful else ""
+        told = f"{instead(u.rms, u.none_rms)}{harm}" if u else ""
         cycles.append((float(hours[first]), float(hours[last]), name, told))
     thinned = []
     for name, values, tone in curves:
         x, y = thin_points(hours, values, points)
-        thinned.append(PageCurve(name=name, hours=x, values=y, tone=tone, dash=int(name == "predicted")))
-    return [_panel(f"{shown.target.removesuffix('_um')} [um]", thinned, cycles)]
+        thinned.append(PageCurve(name=name, hours=x, values=y, tone=tone, dash=int(tone == "--c0")))
+    return [_panel(f"{shown.target.removesuffix('_um')} [{translate('um')}]", thinned, cycles)]
 
 
 def _panel(

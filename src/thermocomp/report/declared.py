@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from thermocomp.core.messages import Message, join
 from thermocomp.judging.results import Assessment
 from thermocomp.judging.settling.averaging import K
 from thermocomp.judging.uncertainty import FIGURES, FigureUncertainty
@@ -22,7 +23,11 @@ def header_lines(recordings: Sequence[Recording]) -> list[str]:
     for r in recordings:
         told.setdefault(str(r.declared.test), []).append(r.name)
     alone = len(told) == 1
-    return [f"Test: {text}" if alone else f"{', '.join(names)}: {text}" for text, names in told.items() if text]
+    return [
+        Message("Test: {text}", text=text) if alone else f"{', '.join(names)}: {text}"
+        for text, names in told.items()
+        if text
+    ]
 
 
 def recording(r: Recording) -> dict[str, Any]:
@@ -31,18 +36,28 @@ def recording(r: Recording) -> dict[str, Any]:
     found: dict[str, Any] = {"test": test} if test else {}
     if w is None:
         return found
-    what = f"{w.material}, " if w.material else ""
-    told = f"Workpiece ({what}{w.length_mm:g} mm, {w.coefficient_um_per_m_K:g} um/(m K), {w.temperature})"
+    told: str = Message(
+        "Workpiece ({material}{length:g} mm, {coefficient:g} um/(m K), {sensor})",
+        material=f"{w.material}, " if w.material else "",
+        length=float(w.length_mm),
+        coefficient=float(w.coefficient_um_per_m_K),
+        sensor=w.temperature,
+    )
     known = {c.name for c in r.temperatures}
     name = r.channel(w.temperature).name if r.has(w.temperature) else ""
     values = r.table[name].to_numpy(dtype=np.float64) if name in known else np.empty(0)
     if not np.isfinite(values).any():
-        told = f"{told}: the recording has no such temperature; correct [workpiece] temperature in the mapping."
+        none = Message(": the recording has no such temperature; correct [workpiece] temperature in the mapping.")
+        told = join([told, none])
         return {**found, "workpiece": {"text": told, "smallest_um": None, "largest_um": None}}
     low, high = (w.expansion(float(f(values))) for f in (np.nanmin, np.nanmax))
-    told = (
-        f"{told}: longer than at {w.reference_degC:g} degC by {low:.2f} to {high:.2f} um, which the errors of the "
-        "machine do not contain."
+    told = Message(
+        "{workpiece}: longer than at {reference:g} degC by {low:.2f} to {high:.2f} um, which the errors of the machine "
+        "do not contain.",
+        workpiece=told,
+        reference=float(w.reference_degC),
+        low=low,
+        high=high,
     )
     return {**found, "workpiece": {"text": told, "smallest_um": low, "largest_um": high}}
 
@@ -61,21 +76,28 @@ def measured(a: Assessment, metric: str, *, none: bool = False) -> str:
 
 def describe(found: FigureUncertainty) -> str:
     """Return what an uncertainty contains, and what it does not, as text."""
-    own = f", with a repeatability of {found.repeatability:.2g} um from the scatter of the rows"
-    own = own if found.repeatability > 0 else ""
-    left = f" Not stated, so not contained: {', '.join(found.absent)}." if found.absent else ""
-    return f"±: expanded measurement uncertainty (k = 2, ISO/TR 230-9){own}.{left}"
+    own = Message(", with a repeatability of {value:.2g} um from the scatter of the rows", value=found.repeatability)
+    absent = [Message(name) for name in found.absent]
+    return Message(
+        "±: expanded measurement uncertainty (k = 2, ISO/TR 230-9){own}.{left}",
+        own=own if found.repeatability > 0 else "",
+        left=Message(" Not stated, so not contained: {names}.", names=join(absent, ", ")) if absent else "",
+    )
 
 
 def budget(a: Assessment) -> Layout | None:
     """Return the contributions to the uncertainty of the figures of a model; None if none are stated."""
     if a.uncertainty is None:
         return None
-    whole = ("expanded (k = 2)", *(a.uncertainty.expanded(f, none=none) for none in (True, False) for f in FIGURES))
-    rows = [*((name, *u.ravel().tolist()) for name, u in a.uncertainty.contributions.items()), whole]
-    headings = ("none: RMS", "none: largest", f"{a.model}: RMS", f"{a.model}: largest")
-    columns = (Column(h, k, "um", unit="um") for k, h in enumerate(headings, start=1))
-    title = f"{a.target}: standard uncertainties of the figures, by contribution"
+    whole = (
+        Message("expanded (k = 2)"),
+        *(a.uncertainty.expanded(f, none=none) for none in (True, False) for f in FIGURES),
+    )
+    rows = [*((Message(name), *u.ravel().tolist()) for name, u in a.uncertainty.contributions.items()), whole]
+    own = Message("{model}: RMS", model=a.model), Message("{model}: largest", model=a.model)
+    headings = (Message("none: RMS"), Message("none: largest"), *own)
+    columns = (Column(h, k, "um", unit="um", named=True) for k, h in enumerate(headings, start=1))
+    title = Message("{target}: standard uncertainties of the figures, by contribution", target=a.target)
     return Layout((Column("contribution", 0), *columns), rows, title, caption=describe(a.uncertainty))
 
 

@@ -54,8 +54,13 @@ def measured(recording: Recording, points: int = POINTS) -> Drawn:
                     ax.text(start, 1.03, name, transform=ax.get_xaxis_transform(), fontsize=7, color="#666")
                     free = start + room * (len(name) + 1)
         for ax, channels, unit, title in (
-            (rest[0], recording.temperatures, "degC", translate("temperatures")),
-            (rest[1], recording.displacements, "um", translate("displacements: error of an uncompensated part")),
+            (rest[0], recording.temperatures, translate("degC"), translate("temperatures")),
+            (
+                rest[1],
+                recording.displacements,
+                translate("um"),
+                translate("displacements: error of an uncompensated part"),
+            ),
         ):
             for k, c in enumerate(channels):
                 values = recording.table[c.name].to_numpy()
@@ -135,16 +140,16 @@ def prediction(assessment: Assessment, blocks: Sequence[Assessment], time: Seque
                 label=translate("residual = with compensation"),
             )
             harmful = bool(block.failure) or any(u.harmful for u in block.verdict.units)
-            mark = "  HARMFUL" if harmful else ""
-            name = shorten(block.block, 60)
+            rms = instead(block.metric("rms"), block.none_metric("rms"))
+            mark = f"  {translate('HARMFUL')}" if harmful else ""
             ax.set_title(
-                f"{name}\nRMS {block.metric('rms'):.2f} instead of {block.none_metric('rms'):.2f} um{mark}",
+                f"{shorten(translate(block.block), 60)}\n{rms}{mark}",
                 fontsize=8,
                 color="#b00020" if harmful else "#222",
             )
             ax.set_xlabel(translate("time [h]"))
         for ax in axes[:, 0]:
-            ax.set_ylabel(f"{shorten(assessment.target.removesuffix('_um'), LONGEST)} [um]")
+            ax.set_ylabel(f"{shorten(assessment.target.removesuffix('_um'), LONGEST)} [{translate('um')}]")
         add_legend(figure, loc="outside upper left", ncols=3)
         return svg(figure)
 
@@ -155,7 +160,12 @@ def _draw_band(ax: Axes, block: Assessment, hours: FloatArray, points: int) -> N
     assert block.half_widths is not None
     rows = slice(None, None, max(1, len(hours) // points))
     low, high = ((alone + sign * block.half_widths)[rows] for sign in (-1, 1))
-    ax.fill_between(hours[rows], low, high, color=BAND, lw=0, zorder=0.5, label=block.band)
+    ax.fill_between(hours[rows], low, high, color=BAND, lw=0, zorder=0.5, label=translate(block.band))
+
+
+def instead(rms: float, none: float) -> str:
+    """Return the RMS of a model and that without compensation [um], as text of the page."""
+    return translate(Message("RMS {rms:.2f} instead of {none:.2f} um", rms=rms, none=none))
 
 
 def robustness(found: Sequence[Assessment]) -> Drawn:

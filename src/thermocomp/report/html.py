@@ -158,7 +158,9 @@ def environment() -> Environment:
     pages.filters["number"] = lambda value, digits=0: write_number(f"{value:.{digits}f}")
     pages.filters["local"] = write_cell
     pages.filters["date"] = write_date
-    pages.filters["plus_minus"] = lambda *given: declared.plus_minus(*given).replace(" ", "\N{NO-BREAK SPACE}")
+    pages.filters["plus_minus"] = lambda *given: write_number(
+        declared.plus_minus(*given).replace(" ", "\N{NO-BREAK SPACE}")
+    )
     pages.filters["hours"] = lambda value: write_number(f"{value:.1f}")
     pages.filters["laid_out"] = laid_out
     pages.filters["live"] = _embed

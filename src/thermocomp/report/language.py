@@ -28,6 +28,9 @@ LANGUAGES = {"en": "English", "de": "Deutsch"}
 #: environment variable with the language of pages
 VARIABLE = "THERMOCOMP_LANGUAGE"
 _NUMBER = re.compile(r"[+-]?\d+\.\d+(e[+-]\d+)?( %)?")
+#: units as in files, and as a page shows them; "um" is a word in German, so only English texts and units are searched
+_UNITS = {"um": "\N{MICRO SIGN}m", "degC": "\N{DEGREE SIGN}C"}
+_UNIT = re.compile(r"""(?<![\w"'])(um|degC)(?![\w"'])""")
 _chosen: ContextVar[str] = ContextVar("language", default="")
 
 
@@ -108,12 +111,16 @@ def translate(text: str, language: str = "") -> str:
         Default: the language of the page.
     """
     language = language or find_language()
-    if language == "en" or not text:
-        return text
-    gettext = load_catalogue(language).gettext
-    if not isinstance(text, Message) or not text.values:
-        return gettext(text)
-    return _Values(language).format(gettext(text.template), **text.values)
+    template = text.template if isinstance(text, Message) else text
+    found = load_catalogue(language).gettext(template) if template else ""
+    if found == template:
+        found = show_units(template)
+    return _Values(language).format(found, **text.values) if isinstance(text, Message) and text.values else found
+
+
+def show_units(text: str) -> str:
+    """Return an English text, or a unit, with its units as a page shows them."""
+    return _UNIT.sub(lambda unit: _UNITS[unit[0]], text)
 
 
 def write_number(text: str, language: str = "") -> str:
@@ -122,9 +129,11 @@ def write_number(text: str, language: str = "") -> str:
 
 
 def write_cell(text: str) -> str:
-    """Return the cell of a table: a number as `write_number` does, a message translated, other text as it is."""
+    """Return the cell of a table: a number as `write_number` does, a message translated, a unit, or text as it is."""
     if isinstance(text, Message):
         return translate(text)
+    if text in _UNITS:
+        return _UNITS[text]
     return write_number(text) if _NUMBER.fullmatch(text) else text
 
 
@@ -150,6 +159,8 @@ class _Values(Formatter):
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if isinstance(value, str):
-            return translate(value, self._language) if isinstance(value, Message) else value
+            return translate(value, self._language) if isinstance(value, Message) else _UNITS.get(value, value)
         text = format(value, format_spec)
+        if "," in format_spec and self._language != "en":
+            text = text.replace(",", "\N{NARROW NO-BREAK SPACE}")
         return write_number(text, self._language) if isinstance(value, float) else text

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from thermocomp.core.messages import Message
+from thermocomp.core.messages import Message, join
 from thermocomp.judging.results import Assessment
 
 #: maximum number of models reported without gate and limits; the JSON output has all
@@ -17,21 +17,39 @@ def describe_running(assessments: Sequence[Assessment]) -> list[str]:
     if limited and limited[0].limits is not None:
         off = [(a, a.metric("rms"), a.alone_metric("rms")) for a in limited]
         other = sorted((x for x in off if f"{x[1]:.2f}" != f"{x[2]:.2f}"), key=lambda x: -abs(x[2] - x[1]))
-        shown = [f"{a.model} for {a.target} {alone:.2f} instead of {ran:.2f} um" for a, ran, alone in other[:MOST]]
-        more = f", and smaller differences for {len(other) - MOST} more" if len(other) > MOST else ""
+        shown = [
+            Message(
+                "{model} for {target} {alone:.2f} instead of {ran:.2f} um",
+                model=a.model,
+                target=a.target,
+                alone=alone,
+                ran=ran,
+            )
+            for a, ran, alone in other[:MOST]
+        ]
+        if len(other) > MOST:
+            shown.append(Message("and smaller differences for {n} more", n=len(other) - MOST))
         lines.append(
             Message(
                 "The judged corrections are those that the machine would apply, with the gate (check of each reading) "
                 "and the limits ({limits}). RMS of the models alone: {alone}.",
                 limits=limited[0].limits.in_words(),
-                alone=f"{', '.join(shown)}{more}" if shown else Message("the same to 0.01 um"),
+                alone=join(shown or [Message("the same to 0.01 um")], ", "),
             )
         )
     if without := list(dict.fromkeys(a.target for a in judged if a.limits is None)):
-        lines.append(f"No limits for {', '.join(without)}: limits apply only to corrections in um.")
+        lines.append(
+            Message("No limits for {targets}: limits apply only to corrections in um.", targets=", ".join(without))
+        )
     lines += [
-        f"The gate rejected {a.rejected} of {len(a.measured)} readings for {a.model}, {a.target}; the first: "
-        f"{a.turned_away}."
+        Message(
+            "The gate rejected {n} of {of} readings for {model}, {target}; the first: {first}.",
+            n=a.rejected,
+            of=len(a.measured),
+            model=a.model,
+            target=a.target,
+            first=a.turned_away,
+        )
         for a in judged
         if a.rejected
     ]

@@ -7,11 +7,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from thermocomp.core.messages import Message
 from thermocomp.core.shown import shorten
 from thermocomp.judging.budget import Budget
 from thermocomp.judging.choice import Choice, Table
 from thermocomp.report.drawing import BESIDE, Drawn, add_legend, drawing, log_ticks, name_ticks, svg
 from thermocomp.report.figures import COLOURS, LONGEST, NONE
+from thermocomp.report.language import translate
 
 #: maximum length of the displacement names above a figure [characters]
 TITLE = 80
@@ -29,13 +31,13 @@ def draw(choice: Choice) -> tuple[Drawn, str] | None:
     """Return the figure of a choice and its caption; None if there is nothing to draw."""
     found = choice.details
     if isinstance(found, Budget):
-        return budget(found), (
+        return budget(found), Message(
             "How many sensors are needed? Lines: mean over the unseen blocks; dots: each block. Ring: sufficient "
             "number, the gain of more sensors is within the margin of the rule. Condition number: collinearity of the "
             "sensors."
         )
     if choice.method == "grouping" and found is not None:
-        return grouping(found, choice.target), (
+        return grouping(found, choice.target), Message(
             "Left: correlation of each pair of temperatures; the groups follow each other and are framed, and the "
             "names of the representatives are bold. Right: the best subset of each number of representatives."
         )
@@ -114,7 +116,7 @@ def budget(b: Budget) -> Drawn:
         errors, repeats, chosen = figure.subplots(3, 1, sharex=True, height_ratios=[3, 1.1, 0.16 * len(b.candidates)])
         recommended = b.recommended()
         shown = b.models.index(recommended[0]) if recommended else 0
-        mean = ", mean" if len(b.targets) > 1 else ""
+        mean = translate(", mean") if len(b.targets) > 1 else ""
         if mean:
             for k, (target, values) in enumerate(zip(b.targets, (b.rms.mean(axis=3) / b.scales)[shown].T, strict=True)):
                 colour, label = COLOURS[(k + len(b.models)) % len(COLOURS)], shorten(target, LONGEST)
@@ -127,39 +129,46 @@ def budget(b: Budget) -> Drawn:
             if enough is not None:
                 place = b.sizes.index(enough)
                 errors.plot(sizes[place], b.mean()[k][place], "o", color=colour, mfc="none", ms=12, mew=1.6)
-        errors.axhline(b.none_mean(), color=NONE, lw=2.5, label="no compensation")
+        errors.axhline(b.none_mean(), color=NONE, lw=2.5, label=translate("no compensation"))
         everything, colour = b.mean()[shown, -1], COLOURS[shown % len(COLOURS)]
-        errors.axhline(everything, color=colour, ls=":", label=f"{b.models[shown]}, all {names[-1]} temperatures")
-        errors.plot([], [], ".", color="#888", label=f"a single unseen block{mean}")
-        errors.plot([], [], "o", color="#444", mfc="none", ms=9, label="sufficient: more is not clearly better")
+        whole = Message("{model}, all {n} temperatures", model=b.models[shown], n=names[-1])
+        errors.axhline(everything, color=colour, ls=":", label=translate(whole))
+        errors.plot([], [], ".", color="#888", label=f"{translate('a single unseen block')}{mean}")
+        sufficient = translate("sufficient: more is not clearly better")
+        errors.plot([], [], "o", color="#444", mfc="none", ms=9, label=sufficient)
         log_ticks(errors, "y")
-        errors.set_ylabel(f"RMS on unseen data [{b.unit}]")
+        errors.set_ylabel(translate(Message("RMS on unseen data [{unit}]", unit=b.unit)))
         names_of = ", ".join(b.targets)
-        title = names_of if len(names_of) <= TITLE or len(b.targets) == 1 else f"{len(b.targets)} displacements"
-        title = f"{shorten(title, TITLE)}: error against the number of temperature sensors"
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
+        title = (
+            names_of
+            if len(names_of) <= TITLE or len(b.targets) == 1
+            else Message("{n} displacements", n=len(b.targets))
+        )
+        title = shorten(translate(title), TITLE)
+        title = Message("{targets}: error against the number of temperature sensors", targets=title)
+        figure.suptitle(translate(title), x=0.01, ha="left", fontsize=9.5, fontweight="bold")
         add_legend(errors, **BESIDE)
         finite = np.isfinite(b.condition)
         repeats.plot(sizes[finite], b.condition[finite], "-s", color="#444", ms=4)
         log_ticks(repeats, "y", dense=0.35)
-        repeats.set_ylabel("condition number")
+        repeats.set_ylabel(translate("condition number"))
         chosen.imshow(b.frequency.T, aspect="auto", cmap="Blues", vmin=0, vmax=1, extent=_extent(b))
         name_ticks(chosen.yaxis, b.candidates, fontsize=7)
         chosen.grid(visible=False)
         for size, sensors in zip(sizes, b.sensors, strict=True):
             rows = [b.candidates.index(s) for s in sensors]
             chosen.plot([size] * len(rows), rows, "o", color=COLOURS[1], ms=3)
-        chosen.plot([], [], "o", color=COLOURS[1], ms=3, label="selected on all rows")
+        chosen.plot([], [], "o", color=COLOURS[1], ms=3, label=translate("selected on all rows"))
         chosen.plot(
             [],
             [],
             "s",
             color="#08306b",
             ms=6,
-            label="selected in all splits (lighter: in some)",
+            label=translate("selected in all splits (lighter: in some)"),
         )
         add_legend(chosen, **BESIDE)
-        chosen.set_xlabel("number of temperature sensors")
+        chosen.set_xlabel(translate("number of temperature sensors"))
         chosen.set_xticks(sizes, names)
         return svg(figure)
 

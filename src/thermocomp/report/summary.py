@@ -90,50 +90,73 @@ def describe_choice(comparison: Comparison, target: str) -> str:
     """Return the numbers behind the recommended method of a target, or which one is written if none is accepted."""
     best, chosen = comparison.best(target), comparison.written(target)
     if chosen is None:
-        return "no method can be written"
+        return Message("no method can be written")
     e, other = comparison.in_use(chosen), comparison.next_best(target)
-    known = "stated" if comparison.stated else "estimated"
-    weights = ":".join(f"{w:g}" for w in WEIGHTS)
-    text = (
-        f"error in use {e.rms:.2f} um (root mean square, weights {weights}, of {e.clean:.2f} with clean readings, "
-        f"{e.noisy:.2f} with noise of {comparison.noise:.2g} degC, {known}, and {e.lost:.2f} with one sensor lost)"
+    text = Message(
+        "error in use {rms:.2f} um (root mean square, weights {weights}, of {clean:.2f} with clean readings, "
+        "{noisy:.2f} with noise of {noise:.2g} degC, {known}, and {lost:.2f} with one sensor lost)",
+        rms=e.rms,
+        weights=":".join(f"{w:g}" for w in WEIGHTS),
+        clean=e.clean,
+        noisy=e.noisy,
+        noise=comparison.noise,
+        known=Message("stated" if comparison.stated else "estimated"),
+        lost=e.lost,
     )
     if best is None:
-        return f"none is accepted; fit writes {chosen.model}, {chosen.word}: {text}"
+        none = Message("none is accepted; fit writes {model}, {word}: ", model=chosen.model, word=Message(chosen.word))
+        return join([none, text])
     if other is None:
         alone = sum(a.target == target for a in comparison.overall()) == 1
-        return text if alone else f"{text}; no other method is accepted"
+        return text if alone else join([text, Message("; no other method is accepted")])
     further = comparison.in_use(other).rms
-    tie = ", a tie: fewer sensors or coefficients" if further < e.rms else ""
-    return f"{text}; {other.model} {further:.2f} um{tie}"
+    tie = [Message(", a tie: fewer sensors or coefficients")] if further < e.rms else []
+    return join([text, Message("; {model} {rms:.2f} um", model=other.model, rms=further), *tie])
 
 
 def cautions(comparison: Comparison) -> list[str]:
     """Return cautions not contained in the verdict: noise, disturbed readings, readings outside the training range."""
     best = [a for t in dict.fromkeys(a.target for a in comparison.assessments) if (a := comparison.best(t)) is not None]
     known = [(a, a.robustness) for a in best if a.robustness is not None]
-    found = []
+    found = list[str]()
     if comparison.left:
         found.append(
-            f"the comparison was stopped: {comparison.left} combinations of method and target were not judged."
+            Message(
+                "the comparison was stopped: {n} combinations of method and target were not judged.", n=comparison.left
+            )
         )
     for why in dict.fromkeys(comparison.unwatched.values()):
         blocks = _list([block for block, of in comparison.unwatched.items() if of == why])
         found.append(
-            f"no watch could be trained without {blocks}, so lost sensors are judged there as undetected: {why}"
+            Message(
+                "no watch could be trained without {blocks}, so lost sensors are judged there as undetected: {why}",
+                blocks=blocks,
+                why=why,
+            )
         )
     loud = [(a, r.noisy_rms) for a, r in known]
     loud = [(a, noisy) for a, noisy in loud if 2 * a.metric("rms") < noisy <= a.none_metric("rms")]
     if loud:
-        text = _list([f"{a.target} from {a.metric('rms'):.1f} to {noisy:.1f}" for a, noisy in loud])
-        found.append(f"noise of {known[0][1].noise:g} degC on every temperature raises the RMS [um]: {text}.")
+        text = _list(
+            [
+                Message("{target} from {low:.1f} to {high:.1f}", target=a.target, low=a.metric("rms"), high=noisy)
+                for a, noisy in loud
+            ]
+        )
+        found.append(
+            Message(
+                "noise of {noise:g} degC on every temperature raises the RMS [um]: {of}.",
+                noise=known[0][1].noise,
+                of=text,
+            )
+        )
     found += harms(comparison)
     beyond = [f"{a.target} ({100 * r.outside:.0f} %)" for a, r in known if r.outside > 0.1]
     if beyond:
-        found.append(f"many rows are outside the trained range of the models: {_list(beyond)}.")
+        found.append(Message("many rows are outside the trained range of the models: {of}.", of=_list(beyond)))
     # no caution if the error there is as elsewhere: such rows were judged in left-out cycles
     found += [
-        f"{a.target}: {describe_unlike(r)}."
+        Message("{target}: {what}.", target=a.target, what=describe_unlike(r))
         for a, r in known
         if r.unlike > 0.1 and r.unlike_rms > WORSE * a.metric("rms")
     ]
@@ -147,7 +170,7 @@ def harms(comparison: Comparison) -> list[str]:
     """
     best = [comparison.best(target) for target in dict.fromkeys(a.target for a in comparison.assessments)]
     return [
-        f"{a.model} for {a.target} is {a.robustness.harm}."
+        Message("{model} for {target} is {harm}.", model=a.model, target=a.target, harm=a.robustness.harm)
         for a in best
         if a is not None and a.robustness is not None and a.robustness.harm
     ]
@@ -155,16 +178,18 @@ def harms(comparison: Comparison) -> list[str]:
 
 def describe_unlike(r: Robustness) -> str:
     """Return the fraction of rows outside the joint support and the error there, as text."""
-    return (
-        f"{100 * r.unlike:.0f} % of the rows are unlike the training data (in the combination of inputs, or by a speed "
-        f"between trained speeds); the RMS there is {r.unlike_rms:.2f} um"
+    return Message(
+        "{share:.0f} % of the rows are unlike the training data (in the combination of inputs, or by a speed between "
+        "trained speeds); the RMS there is {rms:.2f} um",
+        share=100 * r.unlike,
+        rms=r.unlike_rms,
     )
 
 
 def _covered(judged: Validity) -> Table:
-    table = coverage.table({"judged": judged})
-    for_these = "The errors above apply to these conditions; no other conditions were judged."
-    return replace(table, caption=f"{table.caption} {for_these}")
+    table = coverage.table({Message("judged"): judged})
+    for_these = Message("The errors above apply to these conditions; no other conditions were judged.")
+    return replace(table, caption=join([table.caption, for_these], " "))
 
 
 def _models(comparison: Comparison) -> list[str]:
@@ -216,9 +241,11 @@ def _formula(comparison: Comparison, best: Assessment | None, samples: Samples |
         "family": model.family,
         "support": model.support,
         "inputs": model.inputs,
-        "of": "fitted to all rows, as thermocomp fit does for the model file"
+        "of": Message("fitted to all rows, as thermocomp fit does for the model file")
         if samples is not None
-        else f"of one fold only, trained on {', '.join(learned)}; thermocomp fit fits it to all rows",
+        else Message(
+            "of one fold only, trained on {cycles}; thermocomp fit fits it to all rows", cycles=", ".join(learned)
+        ),
     }
 
 
@@ -237,7 +264,7 @@ def _recording(r: Recording) -> dict[str, Any]:
 def _list(names: Sequence[str]) -> str:
     if len(names) == 1:
         return names[0]
-    return Message("{names} and {last}", names=", ".join(names[:-1]), last=names[-1])
+    return Message("{names} and {last}", names=join(names[:-1], ", "), last=names[-1])
 
 
 def _span(values: Sequence[float]) -> Message:

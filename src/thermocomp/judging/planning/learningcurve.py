@@ -9,6 +9,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import FitError
+from thermocomp.core.messages import Message, join
 from thermocomp.judging.budget import SHARE, WORTH, unseen_rms
 from thermocomp.judging.choice import Progress
 from thermocomp.judging.pieces import work_through
@@ -96,19 +97,30 @@ class LearningCurve:
         """Return the interpretation of the learning curve as text."""
         levels = self.by_cycles()
         first, last = levels[0], levels[-1]
-        of = f"{first.rms:.2f} um after {first.learned} of the cycles, {last.rms:.2f} after {last.learned}"
+        of = Message(
+            "{first:.2f} um after {n} of the cycles, {last:.2f} after {of}",
+            first=first.rms,
+            n=first.learned,
+            last=last.rms,
+            of=last.learned,
+        )
         n = last.learned - levels[-2].learned if len(levels) > 1 else 1
-        way = "reduced" if self.last_gain >= 0 else "increased"
-        which = "the last cycle" if n == 1 else f"each of the last {n} cycles"
-        slope = f"{which} {way} the error by {abs(self.last_gain):.2f} um"
+        less = self.last_gain >= 0
+        slope = Message(
+            "{which} reduced the error by {by:.2f} um" if less else "{which} increased the error by {by:.2f} um",
+            which=Message("the last cycle") if n == 1 else Message("each of the last {n} cycles", n=n),
+            by=abs(self.last_gain),
+        )
         if last.rms >= self.none:
-            return f"{of}, {self.none:.2f} without compensation: the model does not help on unseen cycles"
+            none = ", {none:.2f} without compensation: the model does not help on unseen cycles"
+            return join([of, Message(none, none=self.none)])
+        more = Message(": the error is still decreasing, so more cycles of the same kind help")
         if self.enough:
-            return (
-                f"{of}; {slope}: more cycles of the same kind are not worth the time (a gain below {self.worth:.2f} um "
-                "each)"
+            more = Message(
+                ": more cycles of the same kind are not worth the time (a gain below {worth:.2f} um each)",
+                worth=self.worth,
             )
-        return f"{of}; {slope}: the error is still decreasing, so more cycles of the same kind help"
+        return join([of, "; ", slope, more])
 
 
 def learning_curve(

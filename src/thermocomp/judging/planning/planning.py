@@ -8,6 +8,7 @@ import numpy as np
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message, join
 from thermocomp.judging.planning.trial import Kind, Trial
 from thermocomp.models.doubt import Doubt, find_doubt
 from thermocomp.recordings.recording import AMBIENT
@@ -93,27 +94,28 @@ class Covered:
     def news(self, trial: Trial, top_speed: float, swing: float) -> str:
         """Return the new conditions in a test, as text: speed, duration or stop."""
         if trial.kind == "room" and not self.rooms:
-            return "no room temperature was recorded"
+            return Message("no room temperature was recorded")
         if trial.kind == "room":
             most = max(self.rooms)
-            return f"the room temperature changed by at most {most:.1f} degC" if most < 0.5 * swing else ""
+            told = Message("the room temperature changed by at most {most:.1f} degC", most=most)
+            return told if most < 0.5 * swing else ""
         if trial.kind == "random":
             runs, same = [v for v, _, _ in self.runs], SAME * top_speed
             new = [v for v in sorted(set(trial.speeds)) if not any(abs(v - own) <= same for own in runs)]
-            return f"no run at about {', '.join(f'{v:,.0f}' for v in new)} 1/min" if new else ""
+            speeds = join([Message("{speed:,.0f}", speed=v) for v in new] or [""], ", ")
+            return Message("no run at about {speeds} 1/min", speeds=speeds) if new else ""
         fastest = max((v for v, _, _ in self.runs), default=0.0)
         near = [run for run in self.runs if abs(run[0] - trial.speed) <= SAME * top_speed]
         if not near:
-            faster = trial.speed > fastest
-            return f"no run faster than {fastest:,.0f} 1/min" if faster else "no run at about this speed"
+            about = Message("no run at about this speed")
+            return Message("no run faster than {speed:,.0f} 1/min", speed=fastest) if trial.speed > fastest else about
         _, (_, length), *_ = trial.steps
         longest, stop = max(own for _, own, _ in near), max(after for _, _, after in near)
-        found = ""
         if longest < 0.5 * length:
-            found = f"no run at about this speed longer than {longest / 3600:.1f} h"
-        elif trial.kind == "stop" and stop < 0.5 * length:
-            found = f"no stop longer than {stop / 3600:.1f} h after such a run" if stop else "no stop after such a run"
-        return found
+            return Message("no run at about this speed longer than {hours:.1f} h", hours=longest / 3600)
+        found = Message("no stop longer than {hours:.1f} h after such a run", hours=stop / 3600)
+        found = found if stop else Message("no stop after such a run")
+        return found if trial.kind == "stop" and stop < 0.5 * length else ""
 
 
 @dataclass(frozen=True)

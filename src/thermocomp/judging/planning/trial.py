@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from thermocomp.core.messages import Message
+
 #: repeated: alternating runs and stops of half an hour; stop: a run, then a stop of the same length; run: one run
 #: without a stop; room: the spindle is stopped while the room temperature changes; random: as repeated, at speeds in a
 #: random order
@@ -47,13 +49,20 @@ class Trial:
         """Description of the test as text."""
         _, (_, longest), *_ = self.steps
         if self.kind == "room":
-            return f"spindle stopped for {longest / 3600:g} h while the room temperature changes"
+            return Message("spindle stopped for {hours:g} h while the room temperature changes", hours=longest / 3600)
         if self.kind == "random":
-            lowest = f"{min(self.speeds):,.0f}"
-            return (
-                f"{len(self.speeds)} runs of {longest / 3600:g} h at {lowest} to {self.speed:,.0f} 1/min in a random "
-                f"order (seed {self.seed}), each with a stop of equal length"
+            return Message(
+                "{n} runs of {hours:g} h at {low:,.0f} to {high:,.0f} 1/min in a random order (seed {seed}), each with "
+                "a stop of equal length",
+                n=len(self.speeds),
+                hours=longest / 3600,
+                low=min(self.speeds),
+                high=self.speed,
+                seed=self.seed,
             )
-        run = f"{self.speed:,.0f} 1/min for {longest / 3600:g} h"
-        stopped = {"run": run, "stop": f"{run}, then a stop of equal length"}
-        return stopped.get(self.kind, f"{run} and a stop of equal length, repeated")
+        run = Message("{speed:,.0f} 1/min for {hours:g} h", speed=self.speed, hours=longest / 3600)
+        if self.kind == "run":
+            return run
+        if self.kind == "stop":
+            return Message("{run}, then a stop of equal length", run=run)
+        return Message("{run} and a stop of equal length, repeated", run=run)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from thermocomp.core.messages import Message
 from thermocomp.recordings.checks.quality import check, lasting_trouble, troubled_rows
 from thermocomp.recordings.recording import Recording
 from thermocomp.recordings.samples import Samples
@@ -31,7 +32,12 @@ def drop_unsound(samples: Samples, recordings: Sequence[Recording]) -> Samples:
             trouble += [
                 (
                     named.get(f.channel, ""),
-                    f"{called}: data-quality problem in {f.channel or 'the recording'} ({f.kind})",
+                    Message(
+                        "{recording}: data-quality problem in {what} ({kind})",
+                        recording=called,
+                        what=f.channel or Message("the recording"),
+                        kind=Message(f.kind),
+                    ),
                 )
                 for f in lasting_trouble(findings)
                 if not f.channel or f.channel in named

@@ -10,6 +10,7 @@ import numpy as np
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError, UnitError
 from thermocomp.core.machine import Channel
+from thermocomp.core.messages import Message
 from thermocomp.core.units import Unit, find_unit
 from thermocomp.recordings.headings import Meaning, understand
 from thermocomp.recordings.readers.dayforms import find_column_kind
@@ -61,16 +62,20 @@ class PlannedColumn:
         self, raw: FloatArray, missing: Sequence[float | str], place: Callable[[int], str]
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """Return the values in the house unit, NaN where missing, and notes on replaced values and their rows."""
-        notes = []
+        notes, of = [], {"name": self.channel.name, "of": len(raw)}
         codes = np.array([code for code in (*self.rule.missing, *missing) if not isinstance(code, str)])
         absent = np.isin(raw, codes) if codes.size else np.zeros(len(raw), dtype=np.bool_)
         if absent.any():
             found = ", ".join(f"{c:g}" for c in np.unique(raw[absent]))
-            notes.append(f"{self.channel.name}: missing-value code {found} in {absent.sum()} of {len(raw)} cells")
+            code = Message(
+                "{name}: missing-value code {code} in {n} of {of} cells", code=found, n=int(absent.sum()), **of
+            )
+            notes.append(code)
         # SCPI: 9.9E37 denotes infinity, 9.91E37 denotes NaN
         infinite = (np.abs(raw) >= _SCPI_INFINITY) & ~absent
         if infinite.any():
-            notes.append(f"{self.channel.name}: infinite, taken as missing, in {infinite.sum()} of {len(raw)} cells")
+            n = int(infinite.sum())
+            notes.append(Message("{name}: infinite, taken as missing, in {n} of {of} cells", n=n, **of))
         values = np.where(absent | infinite, np.nan, raw) if notes else raw
         if self.rule.zero == "first":
             valid = np.flatnonzero(np.isfinite(values))
@@ -86,14 +91,22 @@ class PlannedColumn:
                 values = np.array(values)
                 values[beyond] = np.nan
                 notes.append(
-                    f"{self.channel.name}: not within {low:g} to {high:g} {self.unit.symbol}, taken as missing, in "
-                    f"{beyond.size} of {len(raw)} cells: {tell_places(beyond.tolist(), place)}"
+                    Message(
+                        "{name}: not within {low:g} to {high:g} {unit}, taken as missing, in {n} of {of} cells: "
+                        "{places}",
+                        low=float(low),
+                        high=float(high),
+                        unit=self.unit.symbol,
+                        n=int(beyond.size),
+                        places=tell_places(beyond.tolist(), place),
+                        **of,
+                    )
                 )
         values = values if self.unit.scale == 1 else values * self.unit.scale
         values = values + self.unit.shift if self.unit.shift else values
         if (infinite := np.isinf(values)).any():
-            cells = f"{infinite.sum()} cells"
-            notes.append(f"{self.channel.name}: infinite by its scale or unit, taken as missing, in {cells}")
+            n = int(infinite.sum())
+            notes.append(Message("{name}: infinite by its scale or unit, taken as missing, in {n} cells", n=n, **of))
             values = np.where(infinite, np.nan, values)
         return values, tuple(notes)
 
@@ -191,7 +204,7 @@ def _plan_mapped(
         used.add(index)
         if rule.role == "ignore":
             said = rule.reason if name in rule.reason else f"{name}: {rule.reason}"
-            notes.extend([f"ignored by the mapping: {said}"] if rule.reason else [])
+            notes.extend([Message("ignored by the mapping: {why}", why=said)] if rule.reason else [])
             continue
         other = tables.setdefault(index, name)
         if other != name:
@@ -202,7 +215,7 @@ def _plan_mapped(
         if rule.role == "cycle":
             continue
         meant, note = _meant(rule, meanings[index], f"{source}: mapping [columns.{name}]", heading)
-        notes.extend([f"{name}: {note}"] if note else [])
+        notes.extend([Message("{name}: {note}", name=name, note=note)] if note else [])
         columns.append(PlannedColumn(index, Channel(name, meant.quantity, meant.house, rule.place), meant, rule))
     return columns, used, notes
 
@@ -229,7 +242,16 @@ def _meant(rule: ColumnMap, meaning: Meaning | None, where: str, heading: str) -
         ) from e
     if not rule.unit or said == meant:
         return said, ""
-    return meant, f"the heading {heading!r} specifies {said.symbol}, the mapping {meant.symbol}; the mapping applies"
+    return meant, _contradicted(heading, said.symbol, meant.symbol)
+
+
+def _contradicted(heading: str, said: str, meant: str) -> Message:
+    return Message(
+        "the heading {heading!r} specifies {said}, the mapping {meant}; the mapping applies",
+        heading=heading,
+        said=said,
+        meant=meant,
+    )
 
 
 def _understand_all(headings: Sequence[str], mapping: Mapping, source: str) -> list[Meaning | None]:

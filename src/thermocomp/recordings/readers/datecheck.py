@@ -9,6 +9,7 @@ import pandas as pd
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import Remedy, TwoReadingsError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.cellkinds import CLOCK, find_kind, is_compact_date, plain_clocks, plain_dates
 from thermocomp.recordings.readers.dateorder import IntArray
 from thermocomp.recordings.readers.dayforms import read_other_days
@@ -66,22 +67,42 @@ def check_dates(time: FloatArray, file: FileCells, others: Sequence[int] = ()) -
     for k in dict.fromkeys((*file.times.unused, *more, *others)):
         cells, name = file.cells[k], table.headings[k] or k + 1
         ignored = is_ignored(table.headings[k], k, file.mapping)
-        mend = f"name it in a mapping, [time] column = {_quoted(heading)} and date = {_quoted(name)}"
+        mend = Message(
+            "name it in a mapping, [time] column = {time} and date = {date}", time=_quoted(heading), date=_quoted(name)
+        )
         if k in others:
             row = _find_other(time, cells, table.headings[k], clock, is_stamp=is_stamp)
         else:
             row = _find_contradiction(time, cells, clock)
         if row is None:
             if is_stamp and k not in others and date is None and not has_passed(heading) and not ignored:
-                notes.append(f"left out: {name!r} holds dates, and {heading!r} only a time of day: {mend}")
+                notes.append(
+                    Message(
+                        "left out: {name!r} holds dates, and {heading!r} only a time of day: {mend}",
+                        name=name,
+                        heading=heading,
+                        mend=mend,
+                    )
+                )
             continue
         first = cells.dropna().iloc[0]
-        said = (
-            f"{name!r} contains {_shown(cells.iloc[row])} in {table.place(row)}, which is not the day "
-            f"{time[row] / 3600:.2f} h after {_shown(first)}, as the time in {heading!r} requires"
+        said = Message(
+            "{name!r} contains {cell} in {place}, which is not the day {hours:.2f} h after {first}, as the time in "
+            "{heading!r} requires",
+            name=name,
+            cell=_shown(cells.iloc[row]),
+            place=table.place(row),
+            hours=float(time[row]) / 3600,
+            first=_shown(first),
+            heading=heading,
         )
         if ignored:
-            notes.append(f"left out, as the mapping specifies: {said}; the times between the rows may be wrong by days")
+            notes.append(
+                Message(
+                    "left out, as the mapping specifies: {what}; the times between the rows may be wrong by days",
+                    what=said,
+                )
+            )
             continue
         use: Remedy = {"time": {"column": heading, "date": name, **({"format": ""} if form else {})}}
         usable = is_stamp and k != date and (k not in others or is_compact_date([str(first)]))

@@ -6,6 +6,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.messages import Message
+
 IntArray = NDArray[np.int64]
 
 _SECOND = 1_000_000_000
@@ -48,7 +50,7 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
         return DateChoice(next(iter(readings)), "", "")  # day and month are equal, as on the fifth of May
     rising = [order for order, t in readings.items() if rises(t)]
     if len(rising) == 1:
-        return DateChoice(rising[0], "rising", "otherwise time would not increase")
+        return DateChoice(rising[0], "rising", Message("otherwise time would not increase"))
     tried = {order: readings[order] for order in rising or readings}
     steps = {order: np.diff(t) for order, t in tried.items()}
     first, *more = steps.values()
@@ -61,7 +63,7 @@ def find_order(readings: Mapping[str, IntArray]) -> DateChoice:
         apart = [follows & (np.abs(steps[o]) >= _MONTH * _DAY) for o in rest]
         if all(a.any() for a in apart) and not any((going_on[o] & ~follows).any() for o in rest):
             days = min(int(np.abs(steps[o])[a].max()) for o, a in zip(rest, apart, strict=True)) // _DAY
-            why = f"otherwise a gap of {days} days would lie between two rows that follow each other"
+            why = Message("otherwise a gap of {days} days would lie between two rows that follow each other", days=days)
             return DateChoice(order, "going on", why)
     return DateChoice("", "", "")
 

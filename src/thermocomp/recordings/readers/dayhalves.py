@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError, Remedy, TwoReadingsError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.numbers import is_number_like
 from thermocomp.recordings.readers.tables import FileTable, skip_row
 from thermocomp.recordings.words import read_word_groups
@@ -89,4 +90,4 @@ def join_halves(
         )
     twelve = texts.str.replace(r"(?<![\d:])0?0(?=:\d\d(?!\d))", "12", n=1, regex=True)  # 00:31 AM
     joined = (twelve + " " + after.map({True: "PM", False: "AM"})).where(there)
-    return joined, (f"{half!r} specifies AM and PM for {time!r}",)
+    return joined, (Message("{half!r} specifies AM and PM for {time!r}", half=half, time=time),)

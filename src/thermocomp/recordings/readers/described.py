@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
+from thermocomp.core.messages import Message, join
 from thermocomp.core.units import is_unit
 from thermocomp.recordings.headings import BRACKETS, is_understood
 from thermocomp.recordings.readers.mapping import Mapping
@@ -41,8 +42,13 @@ def name_channels(table: FileTable, mapping: Mapping) -> FileTable:
         headings[k] = f"{whole_name} [{unit}]" if unit else whole_name
     if headings == list(table.headings):
         return table
-    pairs = (f"{old!r} is {new!r}" for old, new in zip(table.headings, headings, strict=True) if old != new)
-    return replace(table, headings=tuple(headings), notes=(*table.notes, f"the header names: {', '.join(pairs)}"))
+    changed = [(old, new) for old, new in zip(table.headings, headings, strict=True) if old != new]
+    pairs = [Message("{old!r} is {new!r}", old=old, new=new) for old, new in changed]
+    return replace(
+        table,
+        headings=tuple(headings),
+        notes=(*table.notes, Message("the header names: {names}", names=join(pairs, ", "))),
+    )
 
 
 def _bare(cell: str) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.limits import FileLimits
 
 #: candidates in this order; the first under which most of the text is meaningful is used
@@ -43,10 +44,10 @@ def bring_to_utf8(path: Path, limits: FileLimits) -> tuple[bytes | None, tuple[s
                 f"{path}: the file is written in UTF-16, but damaged ({e}); save it as UTF-8 (in a spreadsheet: CSV "
                 "UTF-8)"
             ) from e
-        notes = (f"written in {encoding.upper()}",)
+        notes = (Message("written in {encoding}", encoding=encoding.upper()),)
     if _LONE_CR.search(data):
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        notes = (*notes, "lines end as in files of old Macintoshes")
+        notes = (*notes, Message("lines end as in files of old Macintoshes"))
     return data, notes
 
 

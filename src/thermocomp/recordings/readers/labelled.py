@@ -15,6 +15,7 @@ import pandas as pd
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.messages import Message, join
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
@@ -91,11 +92,13 @@ def _open(lines: Lines, delimiter: str) -> FrameTable | None:
         TimeSeries(p[0].heading, np.concatenate([s.times for s in p]), np.concatenate([s.values for s in p]))
         for p in parts
     ]
-    notes = [f"the file has {len(segments)} segments"] * (len(segments) > 1)
+    notes = [Message("the file has {n} segments", n=len(segments))] * (len(segments) > 1)
     scaled = [key for key in ("ScaleFactor", "Offset") for s in segments for k in s.header.get(key, [])[1:]
               if is_number_like(k) and float(k.replace(",", ".")) != (key == "ScaleFactor")]  # fmt: skip
     if scaled:
-        notes.append(f"{' and '.join(dict.fromkeys(scaled))} of the display are not applied")
+        notes.append(
+            Message("{names} of the display are not applied", names=join([*dict.fromkeys(scaled)], Message(" and ")))
+        )
     decimal = segments[0].cell("Decimal_Separator", 1)
     clock = TimeScale("timestamp", "UTC" if "Starttime of export" in segments[0].header else "naive")
     dated = clock.zone == "UTC" or bool(segments[0].cell("Date", 1))

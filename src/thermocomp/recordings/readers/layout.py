@@ -8,6 +8,7 @@ from functools import cache
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.messages import Message
 from thermocomp.core.units import find_unit, is_unit
 from thermocomp.recordings.headings import (
     BRACKETS,
@@ -140,33 +141,45 @@ def tell_layout(numbers: Sequence[int], layout: FileLayout, word: str) -> tuple[
     above = [numbers[k] for k in range(layout.heading) if k != layout.units]
     between = [numbers[k] for k in range(layout.heading + 1, layout.begin) if k != layout.units]
     if above:
-        found.append(f"{tell_rows(above, word)} above the headings {'is' if len(above) == 1 else 'are'} skipped")
+        skipped = "{rows} above the headings is skipped" if len(above) == 1 else "{rows} above the headings are skipped"
+        found.append(Message(skipped, rows=tell_rows(above, word)))
     if between:
-        places = ", ".join(map(str, between))
         found.append(
-            f"between the headings and the table {word}{'s' * (len(between) > 1)} {places} "
-            f"{'is' if len(between) == 1 else 'are'} skipped"
+            Message(
+                "between the headings and the table {rows} is skipped"
+                if len(between) == 1
+                else "between the headings and the table {rows} are skipped",
+                rows=Message(
+                    f"{word}s {{first}}" if len(between) > 1 else f"{word} {{first}}",
+                    first=", ".join(map(str, between)),
+                ),
+            )
         )
     if layout.units != layout.heading:
-        found.append(f"{word} {numbers[layout.units]} holds the units")
+        found.append(Message("{row} holds the units", row=tell_rows([numbers[layout.units]], word)))
     return tuple(found)
 
 
 def tell_again(lines: Sequence[int]) -> tuple[str, ...]:
     """Return a note for the user on the lines that repeat the headings."""
     places = ", ".join(map(str, lines[:MOST_REMARKS])) + " ..." * (len(lines) > MOST_REMARKS)
-    return (f"the headings are repeated in line {places}; skipped",) if lines else ()
+    return (Message("the headings are repeated in line {places}; skipped", places=places),) if lines else ()
 
 
 def tell_end(numbers: Sequence[int], word: str) -> tuple[str, ...]:
     """Return a note for the user on the rows omitted at the end of a file."""
-    what = "is not part" if len(numbers) == 1 else "are not part"
-    return (f"{tell_rows(numbers, word)} at the end {what} of the table, and left out",) if numbers else ()
+    what = (
+        "{rows} at the end is not part of the table, and left out"
+        if len(numbers) == 1
+        else "{rows} at the end are not part of the table, and left out"
+    )
+    return (Message(what, rows=tell_rows(numbers, word)),) if numbers else ()
 
 
 def tell_rows(numbers: Sequence[int], word: str) -> str:
     """Return consecutive row numbers as text: ``line 3``, ``lines 3 to 7``."""
-    return f"{word} {numbers[0]}" if len(numbers) == 1 else f"{word}s {numbers[0]} to {numbers[-1]}"
+    text = f"{word} {{first}}" if len(numbers) == 1 else f"{word}s {{first}} to {{last}}"
+    return Message(text, first=numbers[0], last=numbers[-1])
 
 
 def join_units(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from thermocomp.core.exceptions import RecordingError, UnitError
+from thermocomp.core.messages import Message
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.headings import BRACKETS, HOUSE_SUFFIX, SUFFIXES, find_named_quantity
 
@@ -32,27 +33,53 @@ def why_left_out(heading: str) -> str:
     found = BRACKETS.fullmatch(heading.strip())
     symbol = (found["square"] or found["round"] or "").strip() if found else heading.rpartition("_")[2]
     if unit := find_electric_unit(heading):
-        return f"{heading!r} is in {unit}: {tell_sensitivity(unit)}, in a mapping [columns.NAME] with its column"
-    mapped = f'a mapping [columns.NAME] with column = "{heading}" and'
-    ignore = 'role = "ignore" if it is of no use'
+        return Message(
+            "{heading!r} is in {unit}: {sensitivity}, in a mapping [columns.NAME] with its column",
+            heading=heading,
+            unit=unit,
+            sensitivity=tell_sensitivity(unit),
+        )
+    mapped = Message('a mapping [columns.NAME] with column = "{heading}" and', heading=heading)
+    ignore = Message('role = "ignore" if it is of no use')
     if not found and "_" not in heading:
-        return f"{heading!r} has no unit; append it to the name (t1_C), or write {mapped} role and unit, or {ignore}"
+        return Message(
+            "{heading!r} has no unit; append it to the name (t1_C), or write {mapped} role and unit, or {ignore}",
+            heading=heading,
+            mapped=mapped,
+            ignore=ignore,
+        )
     try:
         meant = find_unit(symbol)
     except UnitError:
         near = get_close_matches(symbol, SUFFIXES, n=3, cutoff=0.5)
-        known = (
-            f"the nearest are {', '.join(near)}" if near else f"known units are {', '.join(HOUSE_SUFFIX)} and others"
+        known = Message(
+            "the nearest are {names}" if near else "known units are {names} and others",
+            names=", ".join(near or HOUSE_SUFFIX),
         )
-        return (
-            f"{heading!r}: {symbol!r} is not a known unit, {known}; correct the heading, or write {mapped} role and "
-            f"unit, or {ignore}"
+        return Message(
+            "{heading!r}: {symbol!r} is not a known unit, {known}; correct the heading, or write {mapped} role and "
+            "unit, or {ignore}",
+            heading=heading,
+            symbol=symbol,
+            known=known,
+            mapped=mapped,
+            ignore=ignore,
         )
     if meant.quantity == "time":
-        return f"{heading!r}: the time is taken from another column; write {mapped} role and unit if it is not a time"
-    return (
-        f"{heading!r}: {symbol!r} is read as a unit of {meant.quantity} only with a mapping; write {mapped} role = "
-        f'"{meant.quantity}" and unit = "{symbol or meant.symbol}" if it is one, or {ignore}'
+        return Message(
+            "{heading!r}: the time is taken from another column; write {mapped} role and unit if it is not a time",
+            heading=heading,
+            mapped=mapped,
+        )
+    return Message(
+        "{heading!r}: {symbol!r} is read as a unit of {quantity} only with a mapping; write {mapped} role = "
+        '"{quantity}" and unit = "{unit}" if it is one, or {ignore}',
+        heading=heading,
+        symbol=symbol,
+        quantity=meant.quantity,
+        mapped=mapped,
+        unit=symbol or meant.symbol,
+        ignore=ignore,
     )
 
 
@@ -65,9 +92,10 @@ def find_electric_unit(heading: str) -> str:
 
 def tell_sensitivity(unit: str) -> str:
     """Return how the output of a transducer becomes a channel."""
-    return (
-        f'state its sensitivity: role = "displacement", unit = "um" and scale = the um per {unit}, or role = '
-        f'"spindle_speed", unit = "1/min" and scale = the speed per {unit} (600 if 10 {unit} are 6000 1/min), and zero'
+    return Message(
+        'state its sensitivity: role = "displacement", unit = "um" and scale = the um per {unit}, or role = '
+        '"spindle_speed", unit = "1/min" and scale = the speed per {unit} (600 if 10 {unit} are 6000 1/min), and zero',
+        unit=unit,
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from thermocomp.core.exceptions import InputError, RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.cellunits import find_units
 from thermocomp.recordings.readers.described import name_channels
 from thermocomp.recordings.readers.hdf5 import open_hdf5
@@ -77,6 +78,8 @@ def read_embedded(text: str, source: Path) -> tuple[Mapping, list[str]]:
         return ADAPTER.validate_json(text), []
     except ValidationError as e:
         reason = e.errors()[0]["msg"]
-        return Mapping(), [f"thermocomp's own description of the columns is damaged ({reason}) and not used"]
+        return Mapping(), [
+            Message("thermocomp's own description of the columns is damaged ({reason}) and not used", reason=reason)
+        ]
     except InputError as e:
         raise type(e)(f"{source}: {e}") from e

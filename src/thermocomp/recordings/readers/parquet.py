@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import (
@@ -116,7 +117,7 @@ class ParquetTable(FileTable):
 
     def place(self, row: int) -> str:
         """Return the location of a row in the file (1-based)."""
-        return f"row {row + 1}"
+        return Message("row {first}", first=row + 1)
 
     def _batches(self, columns: Sequence[int]) -> Iterator["RecordBatch"]:
         from pyarrow.parquet import ParquetFile
@@ -176,7 +177,7 @@ def open_parquet(path: Path, options: ReadOptions, limits: FileLimits) -> FileTa
         embedded=embedded,
         limits=limits,
         decimal=options.decimal,
-        notes=("the index has no name and holds times: taken as the time",) if timed else (),
+        notes=(Message("the index has no name and holds times: taken as the time"),) if timed else (),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import InputError, TwoReadingsError
+from thermocomp.core.messages import Message
 from thermocomp.core.units import is_unit
 from thermocomp.recordings.headings import is_time_name, plain_name
 from thermocomp.recordings.readers.cellkinds import find_kind
@@ -77,7 +78,11 @@ def pivot(table: FileTable, mapping: Mapping) -> FileTable:
     if all(heads) and len({*heads}) == len(heads):  # sensor.t1, as Home Assistant writes
         series = [replace(s, heading=head) for s, head in zip(series, heads, strict=True)]
     decimal = table.decimal or "." * (getattr(table, "delimiter", "") == ",")
-    told = [*table.notes, *notes, f"a long table: {headings[value]!r} holds the values of {len(series)} channels"]
+    told = [
+        *table.notes,
+        *notes,
+        Message("a long table: {name!r} holds the values of {n} channels", name=headings[value], n=len(series)),
+    ]
     told += [f"not read, holding no numbers: {', '.join(dropped)}"] * bool(dropped)
     clock = TimeScale(headings[plan.time] if zone else "time_s", zone)
     return join_series(table.path, series, clock, mapping.limits, told, decimal)

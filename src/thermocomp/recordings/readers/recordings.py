@@ -12,6 +12,7 @@ import pandas as pd
 
 from thermocomp.core.arrays import FloatArray
 from thermocomp.core.exceptions import InputError, RecordingError, TwoReadingsError
+from thermocomp.core.messages import Message
 from thermocomp.files.draft import draft
 from thermocomp.recordings.cleaning import clean
 from thermocomp.recordings.cycles import Cycle, find_cycles, make_single_cycle, split_at, split_by_labels
@@ -89,10 +90,10 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     numeric = [k for k in left_out if table.is_number(k, empty=False)]
     with _guessing(table, mapping):
         refuse_nameless([table.headings[k] for k in numeric], str(source))
-    notes.extend(f"left out: {why_left_out(table.headings[k])}" for k in numeric[:_MOST_NOTES])
+    notes.extend(Message("left out: {why}", why=why_left_out(table.headings[k])) for k in numeric[:_MOST_NOTES])
     texts_only = [table.headings[k] for k in sorted({*left_out} - {*numeric})]
     if texts_only:
-        notes.append(f"not read, holding no numbers: {', '.join(texts_only)}")
+        notes.append(Message("not read, holding no numbers: {names}", names=", ".join(texts_only)))
     rows = Rows(
         source=str(source),
         sha256=sha256,
@@ -279,7 +280,7 @@ def _shorten(notes: Sequence[str], left_out: int) -> tuple[str, ...]:
     """Return notes limited in number and length, and the number of the omitted ones."""
     found = [n if len(n) <= _MOST_SAID else f"{n[:_MOST_SAID]} ..." for n in notes]
     more = max(len(found) - _MOST_NOTES, 0) + max(left_out - _MOST_NOTES, 0)
-    return (*found[:_MOST_NOTES], *([f"left out or replaced: {more:,} more columns"] if more else []))
+    return (*found[:_MOST_NOTES], *([Message("left out or replaced: {n:,} more columns", n=more)] if more else []))
 
 
 def _labels(file: FileCells) -> list[Any] | None:

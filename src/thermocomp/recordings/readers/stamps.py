@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from thermocomp.core.messages import Message
 from thermocomp.recordings.headings import find_date_orders
 from thermocomp.recordings.readers.dateorder import DateChoice, IntArray, find_longest_step, find_order, rises
 from thermocomp.recordings.words import read_word_groups
@@ -96,7 +97,7 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
     if len(stated) == 1:
         found = parse(plain, _format(shape, stated[0]))
         if len(orders) > 1:
-            notes = (f"the dates are {_WORDS[stated[0]]}, as the heading specifies",)
+            notes = (Message("the dates are {order}, as the heading specifies", order=Message(_WORDS[stated[0]])),)
             _refuse_impossible(plain, shape, orders, stated[0], found)
         _refuse_other_order(plain, shape, stated[0], found, by_heading=len(orders) > 1)
     orders = stated or orders  # two are stated if the row of units contradicts the heading
@@ -116,13 +117,14 @@ def parse_stamps(text: "pd.Series[Any]", heading: str) -> Parsed | None:
             why = "heading and row of units contradict each other" if stated else "no row shows which"
             raise AmbiguousDatesError(asked, [_WORDS[o] for o in possible], why)
         if choice.why:
-            notes = (f"the dates are {_WORDS[choice.order]}: {choice.why}",)
+            notes = (Message("the dates are {order}: {why}", order=Message(_WORDS[choice.order]), why=choice.why),)
         whole = [choice.order]
     elif whole and len(orders) > 1 and not (_has_points(shape) and whole == ["dmy"]):
-        notes = (f"the dates are {_WORDS[whole[0]]}: {_find_proof(plain, read, whole[0])!r} is not a date otherwise",)
+        proof = Message("{date!r} is not a date otherwise", date=_find_proof(plain, read, whole[0]))
+        notes = (Message("the dates are {order}: {why}", order=Message(_WORDS[whole[0]]), why=proof),)
     best = whole[0] if whole else max(orders, key=lambda o: int(read[o].notna().sum()))
     if shape["zone"] in _ZONES and _ZONES[shape["zone"]] != "+00:00":
-        notes += (f"{shape['zone']} is taken as UTC{_ZONES[shape['zone']]}",)
+        notes += (Message("{zone} is taken as UTC{offset}", zone=shape["zone"], offset=_ZONES[shape["zone"]]),)
     return _parsed(read[best], plain.iloc[0], _format(shape, best), notes)
 
 

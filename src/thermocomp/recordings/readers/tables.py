@@ -12,6 +12,7 @@ import pandas as pd
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, Remedy
+from thermocomp.core.messages import Message, join
 from thermocomp.recordings.readers.cellunits import strip_units
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.numbers import Notation, Signs, is_filler, is_number_like, is_word
@@ -132,7 +133,7 @@ class FrameTable(FileTable):
 
     def place(self, row: int) -> str:
         """Return the location of a row in the sheet or file (1-based)."""
-        return f"row {self.rows[row]}"
+        return Message("row {first}", first=int(self.rows[row]))
 
 
 def first_is_number(cells: "pd.Series[Any]", *, empty: bool) -> bool:
@@ -246,9 +247,10 @@ def convert_all(
 
 def tell_notation(notation: Notation) -> tuple[str, ...]:
     """Return the number format as text if it differs from that of Python."""
-    notes: tuple[str, ...] = ("the decimal sign is a comma",) if notation.decimal == "," else ()
+    notes: tuple[str, ...] = (Message("the decimal sign is a comma"),) if notation.decimal == "," else ()
     if notation.thousands:
-        notes += (f"thousands are separated by {' or '.join(map(repr, notation.thousands))}",)
+        marks = join(list(map(repr, notation.thousands)), Message(" or "))
+        notes += (Message("thousands are separated by {marks}", marks=marks),)
     return notes
 
 
@@ -290,8 +292,14 @@ def convert(
     if grouped >= 0:
         _refuse_mixed(table, column, cells, grouped)
     return values, tuple(
-        f"{table.headings[column]}: {word!r}, taken as missing, in {len(rows)} of {len(cells)} cells: "
-        f"{tell_places(rows, table.place)}"
+        Message(
+            "{name}: {word!r}, taken as missing, in {n} of {of} cells: {places}",
+            name=table.headings[column],
+            word=word,
+            n=len(rows),
+            of=len(cells),
+            places=tell_places(rows, table.place),
+        )
         for word, rows in words.items()
     )
 
@@ -316,7 +324,8 @@ def read_plain(cells: "pd.Series[Any]", decimal: str) -> tuple[FloatArray, BoolA
 
 def tell_places(rows: Sequence[int], place: Callable[[int], str]) -> str:
     """List the locations of rows, limited in number."""
-    return ", ".join(place(int(k)) for k in rows[:_MOST_TOLD]) + " ..." * (len(rows) > _MOST_TOLD)
+    told = join([place(int(k)) for k in rows[:_MOST_TOLD]], ", ")
+    return Message("{places} ...", places=told) if len(rows) > _MOST_TOLD else told
 
 
 def _refuse_mixed(table: FileTable, column: int, cells: "pd.Series[Any]", grouped: int) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermocomp.core.messages import Message
 from thermocomp.recordings.readers.limits import FileLimits
 from thermocomp.recordings.readers.mapping import ReadOptions
 from thermocomp.recordings.readers.tables import FrameTable
@@ -41,7 +42,7 @@ def open_tdms(path: Path, options: ReadOptions, limits: FileLimits) -> FrameTabl
             table = make_table(path, vectors, options, limits)
             status = file.file_status
         cut_off = status.incomplete_final_segment
-        return replace(table, notes=(*table.notes, "the file ends within a segment")) if cut_off else table
+        return replace(table, notes=(*table.notes, Message("the file ends within a segment"))) if cut_off else table
 
 
 def _vector(channel: "TdmsChannel") -> Vector:

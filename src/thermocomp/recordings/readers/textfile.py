@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from thermocomp.core.exceptions import RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.headings import is_understood
 from thermocomp.recordings.readers.encodings import bring_to_utf8, find_encoding
 from thermocomp.recordings.readers.layout import (
@@ -156,7 +157,7 @@ class CsvTable(FileTable):
         line = row
         while (shifted := row + bisect_right(self.skipped, line)) != line:
             line = shifted
-        return f"line {line + 1}"
+        return Message("line {first}", first=line + 1)
 
     def _options(self, types: dict[int, Any]) -> dict[str, Any]:
         return {

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from thermocomp.core.exceptions import RecordingError, tell_nearest
+from thermocomp.core.messages import Message
 from thermocomp.recordings.headings import (
     BRACKETS,
     Meaning,
@@ -188,7 +189,7 @@ def _is_epoch(cells: Sequence[str]) -> bool:
 
 
 def _tell_pair(headings: Sequence[str], time: int, date: int) -> str:
-    return f"{headings[date]!r} holds the dates, {headings[time]!r} the time of day"
+    return Message("{date!r} holds the dates, {time!r} the time of day", date=headings[date], time=headings[time])
 
 
 def _paired(time: int, headings: Sequence[str], mapping: Mapping, kinds: Kinds) -> tuple[int, int | None]:

@@ -8,6 +8,7 @@ import pandas as pd
 
 from thermocomp.core.arrays import BoolArray, FloatArray
 from thermocomp.core.exceptions import RecordingError, TwoReadingsError
+from thermocomp.core.messages import Message
 from thermocomp.core.units import find_unit
 from thermocomp.recordings.headings import DAY_FORMS, find_clock_form
 from thermocomp.recordings.readers.cellkinds import CLOCK, HALF, plain_clocks, plain_dates
@@ -60,7 +61,8 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
             )
     notes: tuple[str, ...] = ()
     if beside:
-        notes = (f"columns {', '.join(str(k + 1) for k in beside)} hold the same times as column {times.time + 1}",)
+        numbers = ", ".join(str(k + 1) for k in beside)
+        notes = (Message("columns {numbers} hold the same times as column {n}", numbers=numbers, n=times.time + 1),)
     if file.is_stamp:
         if times.date is not None:
             shown = _join_dates(file, times.date)
@@ -75,10 +77,10 @@ def read_times(file: FileCells, *, rising: bool) -> tuple[FloatArray, str, tuple
         part = file.cells[times.fraction].to_numpy(dtype=np.float64)
         if part.any() and (time % 1 == 0).all():
             time = ((time * 1000 + part) - part[0]) / 1000
-            notes += (f"{table.headings[times.fraction]!r} is added to the time",)
+            notes += (Message("{name!r} is added to the time", name=table.headings[times.fraction]),)
     if zone and start and pd.Timestamp(start).tzinfo is None:
         time, start = _in_zone(time, start, zone, f"{source}: column {file.heading!r}")
-        notes += (f"{file.heading!r} is taken as the time in {zone}",)
+        notes += (Message("{name!r} is taken as the time in {zone}", name=file.heading, zone=zone),)
     steps = np.diff(time)
     wrong = np.flatnonzero(~(steps > 0) if rising else steps < 0) + 1
     if wrong.size:
@@ -242,12 +244,13 @@ def _read_clock(text: "pd.Series[Any]", file: FileCells) -> tuple[FloatArray, st
     steps = np.diff(whole)
     usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     midnights = (steps < 0) & (steps + _DAY > 0) & (steps + _DAY <= 2 * usual)
-    notes: tuple[str, ...] = (f"{file.heading!r} is read as {form}, as the heading specifies",) if short else ()
+    read_as = Message("{name!r} is read as {form}, as the heading specifies", name=file.heading, form=form)
+    notes: tuple[str, ...] = (read_as,) if short else ()
     if not midnights.any() or whole.max() >= _DAY:
         return (whole - whole[0]) / 1e9, "", notes
     places = tell_places((np.flatnonzero(midnights) + 1).tolist(), file.table.place)
     days_on = np.concatenate([[0], np.cumsum(midnights)])
-    notes += (f"the time of day passes midnight in {places}",)
+    notes += (Message("the time of day passes midnight in {places}", places=places),)
     return (whole - whole[0] + days_on * _DAY) / 1e9, "", notes
 
 

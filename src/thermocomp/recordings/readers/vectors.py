@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.headings import BRACKETS, is_time_name
 from thermocomp.recordings.readers.guesses import understand_or_none
 from thermocomp.recordings.readers.limits import FileLimits
@@ -184,7 +185,7 @@ def _choose(path: Path, vectors: list[Vector], options: ReadOptions) -> tuple[li
         return [v for v in group if v.step], ()
     sizes = Counter(v.size for v in group if v.is_time) or Counter(v.size for v in group)
     size = max(sizes, key=lambda n: (sum(v.size == n for v in group), n))
-    notes = (f"group {name!r} of {named} is read",) if len(groups) > 1 else ()
+    notes = (Message("group {name!r} of {names} is read", name=name, names=named),) if len(groups) > 1 else ()
     return [v for v in group if v.size == size], notes + _tell_rest(
         [v for v in group if v.size != size], "of another length"
     )

@@ -17,6 +17,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermocomp.core.exceptions import InputError, MissingExtraError, RecordingError
+from thermocomp.core.messages import Message
 from thermocomp.recordings.headings import is_time_name
 from thermocomp.recordings.readers.layout import (
     MOST_REMARKS,
@@ -117,7 +118,7 @@ def _choose(path: Path, sheets: Sheets, options: ReadOptions) -> tuple[str, tupl
             [{"read": {"sheet": name}} for name in likely],
         )
     name = likely[0] if likely else first
-    return name, (f"sheet {name!r} of {names} is read",)
+    return name, (Message("sheet {name!r} of {names} is read", name=name, names=names),)
 
 
 def _count_rows(rows: Sequence[Sequence[str]]) -> tuple[int, bool]:
