@@ -28,8 +28,9 @@ SETTINGS = (
 
 def save(path: Path) -> None:
     recording = small_machine()
-    table = recording.table.assign(lower_um=lambda t: 0.8 * t["x_um"] + 0.1 * np.sin(np.arange(len(t))))
-    table["coolant"] = 20.0 + table["z_um"] / 50.0  # computed from the deviation
+    columns = {str(name): cells.to_numpy() for name, cells in recording.table.items()}
+    columns["lower_um"] = 0.8 * columns["x_um"] + 0.1 * np.sin(np.arange(len(recording)))
+    columns["coolant"] = 20.0 + columns["z_um"] / 50.0  # computed from the deviation
     book = Workbook()
     cover = book.worksheets[0]
     cover.title = "Deckblatt"
@@ -37,9 +38,9 @@ def save(path: Path) -> None:
         cover.append(row)
     sheet = book.create_sheet("Messdaten")
     sheet.append(["Messprotokoll", "MX500"])
-    sheet.append(["Zeit", *(HEADINGS[c][0] for c in table), "Bemerkung"])
-    sheet.append(["s", *(HEADINGS[c][1] for c in table)])
-    for time, *cells in zip(recording.time.tolist(), *(table[c] for c in table), strict=True):
+    sheet.append(["Zeit", *(HEADINGS[c][0] for c in columns), "Bemerkung"])
+    sheet.append(["s", *(HEADINGS[c][1] for c in columns)])
+    for time, *cells in zip(recording.time.tolist(), *columns.values(), strict=True):
         sheet.append([time, *(f"{v:.3f}".replace(".", ",") for v in cells)])
     book.save(path)
 
