@@ -4,6 +4,8 @@ import json
 import pickle
 import re
 from dataclasses import replace
+from html import unescape
+from pathlib import Path
 from string import Formatter
 
 import numpy as np
@@ -22,6 +24,7 @@ from thermocomp.recordings.recording import Recording
 from thermocomp.report.language import (
     LANGUAGES,
     VARIABLE,
+    load_catalogue,
     load_words,
     translate,
     use_language,
@@ -110,6 +113,40 @@ def test_an_unknown_language_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
         thermocomp.check(small_machine()).page()
 
 
+def find_english(page: str) -> list[str]:
+    """The texts, and beginnings of texts with values, that a German page still has in English; and units of files."""
+    shown = " ".join(unescape(re.sub(r"<(script|style|code).*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)).split())
+    known = load_catalogue("de")
+    starts = [(str(m.id), str(m.id).partition("{")[0].strip()) for m in catalogue.find_texts() if isinstance(m.id, str)]
+    left = [start for text, start in starts if len(start) > 12 and start in shown and start not in known.gettext(text)]
+    return left + re.findall(r"[0-9\[] ?(?:um|degC)\b(?! \d| \w{3})", shown)
+
+
+def test_a_german_choice_of_sensors_and_plan() -> None:
+    chosen = thermocomp.select([small_machine()], models=["ols"], max_sensors=2, jobs=1)
+    planned = thermocomp.plan([small_machine()], curve=False)
+    with use_language("de"):
+        assert not find_english(chosen.page())
+        assert not find_english(f"{translate(str(chosen))} {translate(str(planned))}")
+        assert str(planned).startswith("Record next: ")
+        assert translate(str(planned)).startswith("Als Nächstes aufzeichnen: ")
+
+
+def test_notes_on_reading_are_german(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    rows = "".join(f"{60 * k};{20 + k / 10:.1f};{k / 5:.1f}\n".replace(".", ",") for k in range(50))
+    file.write_text(
+        f"Versuch 1\n\ntime_s;t1_C;z_um;Kraft [kN]\n{rows.replace(chr(10), ';1' + chr(10))}", encoding="utf-8"
+    )
+    recording = thermocomp.read(file)
+
+    german = [translate(note, "de") for note in recording.notes]
+
+    assert "das Dezimalzeichen ist ein Komma" in german
+    assert any(note.startswith("weggelassen: 'Kraft [kN]'") for note in german)
+    assert not [note for note in recording.notes if note in german]
+
+
 def test_a_german_check() -> None:
     found = thermocomp.check(troubled())
     english = found.page()
@@ -126,6 +163,7 @@ def test_a_german_check() -> None:
         assert str(escape(translate(f.text))) in english
         assert str(escape(f.text)) not in german
         assert str(escape(translate(f.text, "de"))) in german
+    assert not find_english(german)
     words = re.findall(r'<script type="application/json" id="words">(.*?)</script>', german)
     assert json.loads(words[0]) == load_words("de", "report/static/")
     assert '<script type="application/json" id="words">{}</script>' in english
@@ -150,6 +188,7 @@ def test_a_german_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
     headings = [h for h in re.findall(r"<h[123]>([^<{]*)</h[123]>", english) if " " in h]
     assert len(headings) > 5
     assert not [h for h in headings if f">{h}<" in german]
+    assert not find_english(german)
     assert "Verwenden: " in german
     assert re.search(r"sinkt der RMS von \d+,\d", german)
     assert "Jeder Punkt ist ein Modell" in german

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from thermocomp.api.keywords import SILENT, Listener
 from thermocomp.core.exceptions import InputError
+from thermocomp.core.messages import Message
 from thermocomp.core.zero import Zeroing
 from thermocomp.judging import splits
 from thermocomp.judging.splits import Judging
@@ -269,9 +270,15 @@ def judging_of(samples: Samples, *, split: str | None = None, leave_one: LeaveOn
 
 def trouble_of(recordings: Sequence[Recording]) -> list[str]:
     """Return the data-quality problems of recordings, one line per problem and per excluded column."""
+    left = Message(". These rows are left out")
     return [
-        f"{r.name}: {f.channel + ' ' if f.channel else ''}{f.text}"
-        f"{'' if f.severity != 'trouble' or f.rows is None else '. These rows are left out'}"
+        Message(
+            "{name}: {channel}{text}{left}",
+            name=r.name,
+            channel=f.channel and f"{f.channel} ",
+            text=f.text,
+            left="" if f.severity != "trouble" or f.rows is None else left,
+        )
         for r, off in zip(recordings, compare_starts(recordings), strict=True)
         for f in (*check(r), *off)
         if f.severity == "trouble" or f.kind in ("left out", "offset")
