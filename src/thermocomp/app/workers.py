@@ -5,14 +5,13 @@ import json
 import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import Any
 
 from thermocomp.core.exceptions import InputError
 
 #: longest time for a task [s]
 PATIENCE = 120.0
-#: tasks at once: each may need as much memory as a large file
-AT_ONCE = 2
 
 
 class Workers:
@@ -20,7 +19,7 @@ class Workers:
 
     def __init__(self) -> None:
         self._ahead: asyncio.Task[Process] | None = None
-        self._places = asyncio.Semaphore(AT_ONCE)
+        self._reading = asyncio.Lock()  # one file at a time: each may need most of the memory that is meant for all
 
     def warm_up(self) -> None:
         """Start the process for the next task."""
@@ -42,7 +41,7 @@ class Workers:
         InputError
             The task was refused, took too long, or its process ended without a result.
         """
-        async with self._places:
+        async with self._reading if "file" in task else nullcontext():
             self.warm_up()
             started, self._ahead = self._ahead, None
             assert started is not None
