@@ -62,7 +62,7 @@ def test_the_page_is_offline_and_complete(spindle: ThermalTest, tmp_path: Path) 
         "spindle at 2600 1/min",
         "y1_um and y2_um 100 mm apart",
         "z_um, with model",
-        "Axis Y: change of the length over 550 mm [um]",
+        "Axis Y: change of the length over 550 mm [µm]",
         "Time constants: cool-down [min]",
         "The text of ISO 230-3:2020 was not available",
         "computed by its formulas as textbooks quote them",

@@ -1,5 +1,6 @@
 """Figure of possible next tests: the gap in the data that each fills, its expected benefit, and the learning curve."""
 
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def _draw_room(ax: Axes, plan: Plan) -> None:
     rooms = plan.covered.rooms
     ax.bar(range(1, 1 + len(rooms)), rooms, color=MEASURED, width=0.6)
     if not rooms:
-        none = translate("no room temperature was recorded").replace(" ", "\n", 1)
+        none = "\n".join(wrap(translate("no room temperature was recorded"), 20))
         ax.text(0.5, 0.5, none, transform=ax.transAxes, ha="center", fontsize=8)
     if plan.swing:
         assumed = translate(Message("assumed: {swing:g} degC", swing=float(plan.swing)))

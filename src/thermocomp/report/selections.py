@@ -138,14 +138,7 @@ def budget(b: Budget) -> Drawn:
         errors.plot([], [], "o", color="#444", mfc="none", ms=9, label=sufficient)
         log_ticks(errors, "y")
         errors.set_ylabel(translate(Message("RMS on unseen data [{unit}]", unit=b.unit)))
-        names_of = ", ".join(b.targets)
-        title = (
-            names_of
-            if len(names_of) <= TITLE or len(b.targets) == 1
-            else Message("{n} displacements", n=len(b.targets))
-        )
-        title = shorten(translate(title), TITLE)
-        title = Message("{targets}: error against the number of temperature sensors", targets=title)
+        title = Message("{targets}: error against the number of temperature sensors", targets=_name_targets(b))
         figure.suptitle(translate(title), x=0.01, ha="left", fontsize=9.5, fontweight="bold")
         add_legend(errors, **BESIDE)
         finite = np.isfinite(b.condition)
@@ -159,18 +152,18 @@ def budget(b: Budget) -> Drawn:
             rows = [b.candidates.index(s) for s in sensors]
             chosen.plot([size] * len(rows), rows, "o", color=COLOURS[1], ms=3)
         chosen.plot([], [], "o", color=COLOURS[1], ms=3, label=translate("selected on all rows"))
-        chosen.plot(
-            [],
-            [],
-            "s",
-            color="#08306b",
-            ms=6,
-            label=translate("selected in all splits (lighter: in some)"),
-        )
+        often = translate("selected in all splits (lighter: in some)")
+        chosen.plot([], [], "s", color="#08306b", ms=6, label=often)
         add_legend(chosen, **BESIDE)
         chosen.set_xlabel(translate("number of temperature sensors"))
         chosen.set_xticks(sizes, names)
         return svg(figure)
+
+
+def _name_targets(b: Budget) -> str:
+    names = ", ".join(b.targets)
+    short = len(names) <= TITLE or len(b.targets) == 1
+    return shorten(names if short else translate(Message("{n} displacements", n=len(b.targets))), TITLE)
 
 
 def _extent(b: Budget) -> tuple[float, float, float, float]:
