@@ -54,7 +54,11 @@ def test_from_a_workbook_to_two_controllers(tmp_path: Path) -> None:
         page.set_input_files("#chosen", file)
         page.wait_for_selector("#recordings canvas", timeout=120_000)
         card = page.locator("#recordings .card")
-        assert "ignored by the mapping: Kühlmittel" in card.inner_text()
+        assert "Kühlmittel_C is not used: Kühlmittel_C has the noise of" in card.locator(".warning").first.inner_text()
+        page.get_by_role("button", name="use it nevertheless").press("Enter")
+        page.wait_for_selector("#recordings li.trouble:has-text('Kühlmittel_C has the noise')", timeout=120_000)
+        page.get_by_role("button", name="Undo the last change").press("Enter")
+        page.wait_for_selector("#recordings .warning:has-text('is not used')", timeout=120_000)
         card.get_by_label("Sheet").select_option("Deckblatt")
         page.wait_for_selector("#recordings .trouble", timeout=120_000)
         assert "K. Hartmann" in card.locator("table").inner_text(), "what the sheet holds"
@@ -85,4 +89,4 @@ def test_from_a_workbook_to_two_controllers(tmp_path: Path) -> None:
         assert not page.locator("#axes").is_visible()
         page.locator("#target .main").press("Enter")
         page.wait_for_selector("#package h2:has-text('export-c99')", timeout=120_000)
-    assert [s["name"] for s in run.read()["steps"]] == ["check", "compare", "fit", "export", "export", "plan"]
+    assert [s["name"] for s in run.read()["steps"]] == ["check", "compare", "fit", "plan", "export", "export"]

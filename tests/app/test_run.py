@@ -166,6 +166,31 @@ def test_the_models_of_an_earlier_run_are_exported(tmp_path: Path, monkeypatch: 
         run_project(Project(folder), silent, number=1)
 
 
+def test_a_reduced_model_has_no_other_inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither the model for a simple controller, nor the full model that it is compared with."""
+    folder = small_project(tmp_path / "project", QUICK + '\n[export]\nto = "fanuc"\n')
+    change(folder, "robustness", 'inputs = ["t2_C", "spindle_rpm"]\nrobustness')
+    given = list[Any]()
+
+    def reduce(model: Path, to: str, recordings: list[Any], **options: Any) -> Any:
+        given.extend(recordings)
+        return tc.export(model, to, recordings, **options)
+
+    monkeypatch.setattr(running, "export", reduce)
+    rerun(folder)
+    assert [[c.name for c in r.temperatures] for r in given] == [["t2_C"]]
+    assert [c.name for c in given[0].displacements] == ["z_um", "x_um"]
+
+
+def test_an_earlier_run_is_not_planned_again(tmp_path: Path) -> None:
+    folder = small_project(tmp_path / "project")
+    rerun(folder)
+    change(folder, "[compare]", '[select]\nmax_sensors = 1\n\n[export]\nto = "c99"\n\n[compare]')
+    run = run_project(Project(folder), silent, number=1).folder
+    assert steps(run) == ["check", "compare", "fit", "export"]
+    assert steps(rerun(folder)) == ["check", "compare", "fit", "export", "select"]
+
+
 def test_a_file_that_changes_meanwhile_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = small_project(tmp_path / "project")
     drift = folder / "files" / "drift.csv"

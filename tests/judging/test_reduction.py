@@ -174,7 +174,12 @@ def test_what_has_the_shape_already_is_taken_as_it_is() -> None:
 
 def test_names_and_digits() -> None:
     assert [find_axis(t, {}) for t in ("z_um", "X1_um", "y", "ch5_um", "zebra")] == ["Z", "X", "Y", "", ""]
-    assert [find_axis(t, {}) for t in ("Verlagerung_X_oben_um", "drift dY1", "dz_um")] == ["X", "Y", "Z"]
+    assert [find_axis(t, {}) for t in ("Verlagerung_X_oben_um", "drift dY1", "dz_um", "\u0394X1_um")] == [
+        "X",
+        "Y",
+        "Z",
+        "X",
+    ]
     assert [find_axis(t, {}) for t in ("tip_X_at_Y100_um", "x_over_z", "axis_um", "ad_z")] == ["", "X", "", "Z"]
     assert find_axis("ch5_um", {"ch5_um": "Z"}) == "Z"
     assert [in_mm(v) for v in (2.7509, -1e-7, 300.0, 0.0)] == ["0.0027509", "-0.0000000001", "0.3", "0"]

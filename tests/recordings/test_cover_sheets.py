@@ -13,6 +13,7 @@ from openpyxl import Workbook
 
 from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.readers.mapping import Mapping, ReadOptions
+from thermocomp.recordings.readers.mending import mend, take_best
 from thermocomp.recordings.readers.recordings import read
 from thermocomp.recordings.recording import Recording
 
@@ -102,3 +103,20 @@ def test_two_tables_with_times_are_asked_about(tmp_path: Path) -> None:
         offered = [remedy["read"]["sheet"] for remedy in raised.value.remedies]
         assert offered == [name for name in order if name != "Kurz"]
         check(read(path, Mapping(read=ReadOptions(sheet="Kurz"))), 9)
+
+
+def test_rows_that_are_skipped_are_told(tmp_path: Path) -> None:
+    body = table(40, german, {})
+    path = save(tmp_path / "a.xlsx", {"Daten": [HEADINGS, UNITS, *body[:20], ["Umbau am Taster", 3], *body[20:]]})
+    mended = mend(path, "", take_best)
+    assert len(mended.recording) == 40
+    assert "rows skipped by the mapping: 23" in mended.recording.notes
+
+
+@pytest.mark.parametrize("word", ["n.v.", "k.A.", "N/A"])
+def test_a_word_for_no_value_costs_no_row(tmp_path: Path, word: str) -> None:
+    body = table(60, german, {})
+    body[30][4] = word
+    found = read(save(tmp_path / "a.xlsx", {"Daten": [HEADINGS, UNITS, *body]}))
+    check(found, 60)
+    assert found.table["Lager_vorn_C"].isna().sum() == 1

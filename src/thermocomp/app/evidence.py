@@ -67,7 +67,9 @@ def points_of(found: Selected) -> str:
         budget = c.details if isinstance(c.details, Budget) else None
         points = [] if budget is None else _points(budget)
         unit = "" if budget is None else budget.unit
-        drawn.append({"target": c.target, "chosen": c.sensors, "why": c.reason, "unit": unit, "points": points})
+        drawn.append(
+            {"target": c.target, "chosen": c.sensors, "why": translate(c.reason), "unit": unit, "points": points}
+        )
     return as_text({"choices": drawn})
 
 

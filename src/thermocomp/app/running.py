@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -119,12 +120,14 @@ def _go_on(project: Project, tell: Callable[..., object], number: int) -> "Proje
         raise InputError(
             f"{folder.path}: since this run a recording, a mapping or the version of thermocomp has changed: run again"
         )
-    return _work(learned, folder, tell, tomlkit.dumps(learned.content))
+    return _work(learned, folder, tell, tomlkit.dumps(learned.content), only_models=True)
 
 
-def _work(project: Project, folder: RunFolder, tell: Callable[..., object], settings: str) -> "ProjectRun":
+def _work(
+    project: Project, folder: RunFolder, tell: Callable[..., object], settings: str, *, only_models: bool = False
+) -> "ProjectRun":
     write_text(settings, folder.path / NAME, overwrite=True)
-    run = ProjectRun(project, folder, tell)
+    run = ProjectRun(project, folder, tell, only_models=only_models)
     run.work()
     return run
 
@@ -138,9 +141,14 @@ class ProjectRun:
     folder : RunFolder
     tell : callable
         Receives the progress; see `RunProgress`.
+    only_models : bool
+        Export and assess the models only.
     """
 
-    def __init__(self, project: Project, folder: RunFolder, tell: Callable[..., object]) -> None:
+    def __init__(
+        self, project: Project, folder: RunFolder, tell: Callable[..., object], *, only_models: bool = False
+    ) -> None:
+        self.only_models = only_models
         self.project, self.folder, self.tell = project, folder, tell
         self.settings = project.settings
         self.compared: Compared | None = None
@@ -163,14 +171,15 @@ class ProjectRun:
         ):
             if not self._has("fit"):
                 self._learn()
-            self.folder.state.steps = [s for s in self.folder.state.steps if not s.error]
+            again = ("export", "assess") if self.only_models else ("export", "assess", "select", "plan")
+            self.folder.state.steps = [s for s in self.folder.state.steps if not (s.error and s.name in again)]
             if self.settings.export is not None:
                 self._follow("export", self._export, self.project.key_of(("export", "limits"), ()))
             if self.settings.assess:
                 self._follow("assess", self._assess, self.project.key_of(("limits",), self.settings.assess))
-            if self.settings.select is not None:
+            if not self.only_models and self.settings.select is not None:
                 self._follow("select", self._select, self.project.key_of(("select",), ()), only=True)
-            if self.settings.plan is not None:
+            if not self.only_models and self.settings.plan is not None:
                 self._follow("plan", self._plan, self.project.key_of(("plan",), ()), only=True)
 
     def _learn(self) -> None:
@@ -254,12 +263,21 @@ class ProjectRun:
     def _export(self) -> tuple[list[str], str]:
         options = self.settings.export
         assert options is not None
-        reduced = self._recordings() if find_target(options.to).shape else None
+        reduced = [*map(self._chosen, self._recordings())] if find_target(options.to).shape else None
         found = export(self._model, options.to, reduced, limits=self.settings.limits, **given(options, ("to",)))
         folder = free(str(self.folder.path / "-".join(["export", options.to, *filter(None, [options.dialect])])))
         found.save(folder)
         told = [f"{target} is left out: {why}" for target, why in {**found.refused, **found.elsewhere}.items()]
         return [f"{folder.name}/{name}" for name in found.files], ". ".join([*filter(None, [found.verdict]), *told])
+
+    def _chosen(self, recording: Recording) -> Recording:
+        """Return a recording with those temperatures only that the settings choose as inputs."""
+        inputs = self.settings.compare.inputs
+        if not inputs:
+            return recording
+        named = {inputs} if isinstance(inputs, str) else {*inputs}
+        kept = [c for c in recording.channels if c.quantity != "temperature" or c.name in named]
+        return replace(recording, channels=tuple(kept), table=recording.table[[c.name for c in kept]])
 
     def _assess(self) -> tuple[list[str], str]:
         tests = self._read(self.settings.assess)

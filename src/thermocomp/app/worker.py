@@ -73,6 +73,7 @@ def preview(file: str, mapping: str, guess: bool, answers: list[Mapping[str, Any
     ways = [located(f, recording, whole, table.headings) if f.remedy else {} for f in findings]
     return {
         "mapping": mended.text,
+        "ignored": {name: c.reason for name, c in whole.columns.items() if c.role == "ignore" and c.reason},
         **_sheets(file, whole),
         "summary": translate(_summary(recording)),
         "columns": _columns(table, whole),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermocomp.core.messages import Message
 from thermocomp.judging.do_no_harm import Verdict, join_verdicts
 from thermocomp.judging.inuse import InUse, least, pool
 from thermocomp.judging.splits import Judging, Split
@@ -151,15 +152,17 @@ def correct_verdicts(
     """Correct the verdicts on the methods tried for one target for the number of methods."""
     after = dict(zip(verdicts, holm(list(verdicts.values())), strict=True))
     if primary is not None:
-        after[primary] = replace(after[primary], p=None, about="primary method set before the evaluation")
+        after[primary] = replace(after[primary], p=None, about=Message("primary method set before the evaluation"))
     elif found is not None and found.verdict.accepted:
         mine = after[found.method]
         better = min(found.verdict.p_value, mine.p_value)
         after[found.method] = replace(
             mine,
             p=better,
-            about="selected again in each fold with the left-out cycle or file excluded, so the selection is part "
-            "of the test",
+            about=Message(
+                "selected again in each fold with the left-out cycle or file excluded, so the selection is part of the "
+                "test"
+            ),
         )
     return after
 

@@ -20,7 +20,8 @@ from thermocomp.recordings.declared import Declared
 from thermocomp.recordings.frames import parts_of
 
 AMBIENT = re.compile(
-    r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgebung\w*|luft|raum\w*|halle\w*)(?:$|[_\W])", re.IGNORECASE
+    r"(?:^|[_\W])(air|ambient|room|workshop|environment|umgeb\w*|umg|luft|lufttemp\w*|raum\w*|halle\w*)(?:$|[_\W])",
+    re.IGNORECASE,
 )
 
 

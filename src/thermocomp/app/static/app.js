@@ -74,6 +74,7 @@ function draw(name) {  // the card of a recording
   }
   card.append(element("p", found.summary), sheets(name, found), scrolling(preview(name, found.columns)));
   if (found.notes.length) card.append(element("h3", _("Notes on reading")), element("ul", "", "", ...found.notes.map(n => element("li", n))));
+  for (const [channel, reason] of Object.entries(found.ignored)) card.append(element("p", _("{channel} is not used: {reason}", { channel, reason }) + " ", "warning", button(_("use it nevertheless"), () => answer(name, [{ columns: { [channel]: { role: "temperature", reason: "" } } }]))));
   for (const q of found.questions) card.append(element("p", q.text, "warning"), choices(name, q.options));
   if (found.findings.length) card.append(element("h3", _("Found in the data")), element("ol", "", "", ...found.findings.map(f => {
     const line = element("li", "", f.severity, element("strong", _(f.severity) + " "), `${f.channel} ${f.text} `);
@@ -150,18 +151,19 @@ function judgeForm() {  // only what is not yet shown: a choice of the user stay
 }
 const chosen = id => [...document.querySelectorAll(`#${id} input:checked`)].map(i => i.value);
 
+function start(how = "") { $("progress").replaceChildren(_("starting ...")); return api(`api/runs${how}`, "POST"); }
+
 const startRun = quietly(async event => {
   event.preventDefault();
   const all = document.querySelectorAll("#targets input").length, targets = chosen("targets"), models = chosen("methods"), inputs = chosen("inputs"), unit = chosen("units")[0], compare = { ...(state.settings.compare || {}) };
   if (!targets.length || !models.length || !inputs.length) return alarm(_("Choose at least one deviation, one method and one input."));
   const usualOnes = usualInputs(), asUsual = [...document.querySelectorAll("#inputs input")].every(i => i.checked === Boolean(usualOnes[i.value]));
   for (const [key, value, usual] of [["targets", targets, targets.length === all], ["inputs", inputs, asUsual], ["models", models, models.join() === METHODS.slice(0, USUAL).join()], ["leave_one", unit, unit === "cycle"]]) if (usual) delete compare[key]; else compare[key] = value;
-  $("progress").replaceChildren(_("starting ..."));
   chosenRun = 0;
   const language = state.settings.language || LANGUAGE === "en" ? {} : { language: LANGUAGE };  // of the reports, as of the page
   try {
     await api("api/settings", "PUT", { compare: Object.keys(compare).length ? compare : null, ...language });
-    await api(`api/runs?again=${$("again").checked}`, "POST");
+    await start(`?again=${$("again").checked}`);
   } catch (e) { render(state); throw e; }
   $("again").checked = false;
 });
@@ -176,7 +178,7 @@ function progress(run) {
   if (!running) return box.replaceChildren(run.error ? element("p", _("Run {number} {state}: {error}", { number: run.number, state: _(run.state), error: run.error }), run.state) : "");
   const bar = element("progress"), spent = Date.now() / 1000 - run.step_began;
   if (run.total) { bar.max = run.total; bar.value = run.done; }
-  const left = run.done > 2 ? _(", about {time} left", { time: minutes(spent / run.done * Math.max(run.total - run.done, 0)) }) : "";
+  const left = run.done > 2 && run.done > run.total / 20 ? _(", about {time} left", { time: minutes(spent / run.done * Math.max(run.total - run.done, 0)) }) : "";
   bar.setAttribute("aria-label", _("progress"));
   box.replaceChildren(element("p", _("Run {number}: {step}", { number: run.number, step: run.step || _("reading") }) + (run.total ? _(", {done} of {total} tasks", { done: run.done, total: run.total }) + left : "") + `. ${run.task}`), bar);
 }
@@ -211,7 +213,7 @@ function runsTable(runs) {
 
 // -- deployment --------------------------------------------------------------------------------------------------------
 
-const fitted = () => state.runs.filter(r => r.state !== "running" && r.steps.some(s => s.name === "fit"));
+const fitted = () => state.runs.filter(r => r.steps.some(s => s.name === "fit"));
 
 function deployForm(run, told) {
   if (!$("to").children.length) for (const [key, text] of Object.entries(TARGETS)) $("to").append(new Option(text, key));
@@ -219,7 +221,7 @@ function deployForm(run, told) {
   $("verdicts").textContent = run.steps.filter(s => s.name === "compare").map(s => s.text).join(" ");
   const steps = run.steps.filter(s => s.name === "export"), taken = [];
   $("package").replaceChildren(...steps.map(s => s.error ? element("p", s.error, "trouble") : packageCard(run, s)));
-  if (!steps.length) $("package").append(element("p", _("Nothing is exported yet."), "quiet"));
+  if (!steps.length) $("package").append(element("p", run.state === "running" ? _("The run goes on ...") : _("Nothing is exported yet."), "quiet"));
   const chosen = Object.fromEntries(((state.settings.export || {}).axes || []).map(text => text.split("=")));
   const letters = ((told.results.fit || {}).models || []).map(({ target }) => {  // as chosen before, else as named, each axis once
     const letter = Object.keys(chosen).length ? chosen[target] : (told.axes || {})[target], input = element("select");
@@ -251,7 +253,7 @@ const exportModels = quietly(async event => {
   $("package").replaceChildren(element("p", _("exporting ..."), "quiet"));
   try {
     await api("api/settings", "PUT", { export: { ...kept, to, dialect: dialect || "", ...($("axes").hidden ? {} : { axes }) } });
-    await api(`api/runs?number=${$("exported").value}`, "POST");
+    await start(`?number=${$("exported").value}`);
   } catch (e) { shownRun = ""; render(state); throw e; }  // refused: not "exporting ..." for ever
 });
 

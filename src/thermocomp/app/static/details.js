@@ -50,7 +50,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
     const names = order.filter(name => points.some(p => p.model === name)), colour = name => `var(--c${order.indexOf(name) % 6})`, svg = shape("svg", { viewBox: `0 0 ${W} ${H}`, class: "scatter", role: "group", "aria-label": title });
     const x = n => L + (W - L - 12) * (n - 0.5) / last, y = v => (H - B) * (1 - v / top) + 12, said = element("p", _("A click on a point shows its sensors."), "quiet");
     said.setAttribute("role", "status");
-    for (const part of [0, 0.25, 0.5, 0.75, 1]) svg.append(shape("line", { x1: L, x2: W - 8, y1: y(part * top), y2: y(part * top), class: "grid" }), shape("text", { x: L - 6, y: y(part * top) + 4, "text-anchor": "end" }, (part * top).toPrecision(2)));
+    for (const part of [0, 0.25, 0.5, 0.75, 1]) svg.append(shape("line", { x1: L, x2: W - 8, y1: y(part * top), y2: y(part * top), class: "grid" }), shape("text", { x: L - 6, y: y(part * top) + 4, "text-anchor": "end" }, Number((part * top).toPrecision(2)).toLocaleString(LANGUAGE)));
     for (let n = 1; n <= last; n += Math.ceil(last / 12)) svg.append(shape("text", { x: x(n), y: H - B + 24, "text-anchor": "middle" }, String(n)));
     svg.append(shape("text", { x: (W + L) / 2, y: H - 1, "text-anchor": "middle" }, what));
     for (const p of points) {
@@ -76,7 +76,7 @@ const most = pairs => pairs.filter(([, v]) => v != null).sort((a, b) => b[1] - a
       if (points.length) box.append(scatter(_("Smallest sets of temperatures: {target}", { target: c.target }), _("temperature sensors"), c.unit, points, order, true));
     }
     for (const target of new Set(own.map(r => r.target))) box.append(scatter(_("Methods compared, all inputs: {target}", { target }), _("inputs"), "um", own.filter(r => r.target === target).map(r => ({ model: r.model, sensors: r.sensors, count: r.n_sensors, error: r.rms_um })), order));
-    const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await api("api/runs", "POST"); }));
+    const ask = button(_("Find the smallest sufficient set of sensors"), quietly(async () => { await api("api/settings", "PUT", { select: state.settings.select || {} }); await start(); }));
     const failed = run.steps.filter(s => s.name === "select" && s.error).map(s => element("p", s.error, "trouble"));
     return [element("h3", _("Number of sensors against error on unseen data")), ...failed, ...chosen.map(c => element("p", c.why)), box, chosen.length ? "" : element("p", "", "", ask)];
   }

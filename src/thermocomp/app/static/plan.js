@@ -22,7 +22,7 @@
       if (value === "" || value === DEFAULTS[input.name]) delete plan[input.name]; else plan[input.name] = value;
     }
     await api("api/settings", "PUT", { plan });
-    await api("api/runs", "POST");
+    await start();
     $("planned").replaceChildren(element("p", _("Planning ..."), "quiet"));
   }));
 
@@ -35,7 +35,7 @@
       for (const a of links) if (a.href && !a.href.endsWith(".png")) a.download = a.textContent;
       $("planned").replaceChildren(element("h2", _("The next test")), element("p", step.text), element("p", _("NC program, measurement sheet and figure:") + " ", "", ...links),
         element("h3", _("Tests considered")), table([_("test"), _("expected gain [um]"), _("new")], results.plan.candidates.map(c => [c.words, range(c), c.news])));
-    } else $("planned").replaceChildren(element("p", _("Nothing is planned yet."), "quiet"));
+    } else $("planned").replaceChildren(element("p", run.state === "running" && state.settings.plan ? _("Planning ...") : _("Nothing is planned yet."), "quiet"));
     live(run);
   });
 

@@ -15,6 +15,8 @@ from thermocomp.export.facts import Facts, tell_verdict
 
 #: largest number of eight digits
 _LARGEST = Decimal(99_999_999)
+#: how names begin that denote a change: dX, and the Greek letter and the sign
+_CHANGE = "(?:d|delta|\u0394|\u2206)?"
 
 
 @dataclass(frozen=True)
@@ -221,10 +223,12 @@ def find_axis(target: str, named: dict[str, str]) -> str:
     """
     if target in named:
         return named[target]
-    if begins := re.fullmatch(r"d?([xyz])([\d_].*)?", target, re.IGNORECASE):
+    if begins := re.fullmatch(rf"{_CHANGE}([xyz])([\d_].*)?", target, re.IGNORECASE):
         return begins[1].upper()
     words = re.split(r"[\W_]+", target)
-    letters = {found[1].upper() for word in words if (found := re.fullmatch(r"d?([xyz])\d*", word, re.IGNORECASE))}
+    letters = {
+        found[1].upper() for word in words if (found := re.fullmatch(rf"{_CHANGE}([xyz])\d*", word, re.IGNORECASE))
+    }
     return letters.pop() if len(letters) == 1 else ""
 
 

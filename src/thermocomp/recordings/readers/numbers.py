@@ -9,7 +9,7 @@ from thermocomp.core.exceptions import RecordingError
 from thermocomp.recordings.words import read_words
 
 #: texts that denote a missing value, besides an empty cell
-MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan")
+MISSING_TEXT = ("", "nan", "na", "n/a", "none", "null", "#n/a", "<na>", "-nan", "n.v.", "k.a.", "k. a.", "n.a.")
 #: placeholders of loggers and spreadsheets for a missing number, in lower case
 _FILLERS = frozenset(read_words("missing_numbers"))
 _RUN = re.compile(r"([-+*?#.])\1*|err:\d+")
