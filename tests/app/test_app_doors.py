@@ -142,7 +142,7 @@ def try_requests(folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> d
         json.dumps(found, allow_nan=False)
         return found
 
-    async def idle(_: Store, *, again: bool) -> None: ...
+    async def idle(_: Store, *, again: bool, number: int = 0) -> None: ...
 
     monkeypatch.setattr(workers.Workers, "ask", ask)
     monkeypatch.setattr(workers.Workers, "warm_up", lambda _: None)

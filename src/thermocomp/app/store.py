@@ -259,7 +259,7 @@ class Store:
             The last one that was started here has not ended.
         """
         ended = self._last_end()
-        if self._run is not None and ended != self._before:  # its result is there: it is about to end
+        if self._run is not None and ended[0] and ended != self._before:  # its result is there: it is about to end
             with suppress(subprocess.TimeoutExpired):
                 await asyncio.to_thread(self._run.wait, ENDING)
         if self._run is not None and self._run.poll() is None:
@@ -274,8 +274,10 @@ class Store:
             self._run = subprocess.Popen(words, stdin=nothing, stdout=log, stderr=log, cwd=self.folder, **more)
 
     def _last_end(self) -> tuple[str, int]:
-        """Return number and time of the run that ended last."""
+        """Return time and number of the run that ended last; of none while one goes on."""
         found = [run.read() for run in runs_of(self.folder)]
+        if any(run["state"] == "running" for run in found):
+            return "", 0
         return max(((run["ended"], run["number"]) for run in found), default=("", 0))
 
     def trouble(self) -> str:
