@@ -66,8 +66,8 @@ def _read_rows(source: Path, mapping: Mapping, *, rising: bool, extra: Sequence[
     table, sha256 = open_table(source, mapping)
     notes = [*table.notes]
     if mapping.read.skip:
-        rows = ", ".join(str(s) if isinstance(s, int) else f"{s[0]}-{s[1]}" for s in mapping.read.skip)
-        notes.append(Message("rows skipped by the mapping: {rows}", rows=rows))
+        skipped = ", ".join(str(s) if isinstance(s, int) else f"{s[0]}-{s[1]}" for s in mapping.read.skip)
+        notes.append(Message("rows skipped by the mapping: {rows}", rows=skipped))
     confirmed = bool(mapping.time.unit)
     if table.embedded:
         described, damage = read_embedded(table.embedded, source)
